@@ -7,24 +7,28 @@ never goes back.
 
 from collections.abc import Sequence
 from math import inf
+from operator import attrgetter
 from typing import assert_never
 
 from mav_tasks.engine import inputs
-from mav_tasks.engine.clients.broadcasts import Broadcasts
+from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.flood_gate import FloodGates
-from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.operator_watch import OperatorWatch
-from mav_tasks.engine.clients.parameters import ParameterServer
+from mav_tasks.engine.clients.parameters import ParameterServer, ParamMessage
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
+from mav_tasks.engine.clients.restart_watch import RestartWatch
+from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands.any_rover import AnyRover
 from mav_tasks.engine.commands.assignments import Assignments
+from mav_tasks.engine.commands.command_request import MessageRequest
 from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
@@ -32,19 +36,23 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
+from mav_tasks.engine.commands.words import kind_of_message
 from mav_tasks.engine.figures import Figures
-from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Peer
+from mav_tasks.engine.inputs import FLEET_LINK, Input, LinkSide, Outgoing, Packets, Peer
 from mav_tasks.engine.missions.mission_reports import MissionReports
-from mav_tasks.engine.missions.mission_server import MissionServers
+from mav_tasks.engine.missions.mission_server import MissionMessage, MissionServers
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.packet_reader import PacketReader
-from mav_tasks.engine.reception import Reception
+from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.snapshot import Reach, Snapshot, VehicleSnapshot
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.control import Event as ControlEvent
 from mav_tasks.engine.vehicles.hands import Word
+from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
+from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import SubmissionDeduplicator
@@ -94,14 +102,14 @@ class Engine:
         )
         self._gates = FloodGates(is_client=gcs.has, settings=settings.clients)
         vehicles = self._vehicles = VehicleSide(
-            queue=self._packets,
-            packer=packer,
-            signatures=self.signatures,
-            registry=registry,
-            fleet=self._fleet,
-            timers=timers,
-            settings=settings,
-            is_shared=bool(earlier.gateway),
+            self._packets,
+            packer,
+            self.signatures,
+            registry,
+            self._fleet,
+            timers,
+            settings,
+            LeaseWatch(timers, is_shared=bool(earlier.gateway)),
         )
         deduplicator = self._deduplicator = SubmissionDeduplicator(registry)
         deduplicator.restore(earlier.tasks, now=now)
@@ -114,10 +122,11 @@ class Engine:
         )
         plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
         self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
-        displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
+        displays = self._displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
         refusals = Refusals(registry, vehicles)
         modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
-        control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
+        control = self._control = TaskControl(registry)
+        rates = TelemetryRates(gcs, vehicles)
         assignments = self._assignments = Assignments(
             vehicles, self._fleet, registry, timers, settings, is_open=lambda: submissions.is_open
         )
@@ -136,28 +145,12 @@ class Engine:
         self._passing = Forwarder(vehicles, refusals)
         self._door = Door(vehicles, refusals)
         self._operator = OperatorWatch(timers, self._note_unheard, settings)
-        self._reception = Reception(
-            gcs=gcs,
-            vehicles=vehicles,
-            gates=self._gates,
-            intake=self._intake,
-            door=self._door,
-            elsewhere=self._elsewhere,
-            broadcasts=Broadcasts(vehicles, packer),
-            commands=Commands(
-                vehicles, registry, submissions, plans, modes, control, displays, self._any
-            ),
-            control=control,
-            modes=modes,
-            displays=displays,
-            setup=SetupSigning(self.signatures, vehicles),
-            desks=self._desks,
-            operator=self._operator,
-            parameters=self._parameters,
-            passing=self._passing,
-            publisher=self._publisher,
-            reports=self._reports,
+        self._broadcasts = Broadcasts(vehicles, packer)
+        self._commands = Commands(
+            vehicles, registry, submissions, plans, modes, control, displays, self._any
         )
+        self._setup = SetupSigning(self.signatures, vehicles)
+        self._restarts = RestartWatch()
         #: figures for metrics
         self.figures = Figures(vehicles, gcs, self._gates, self._fleet, registry)
         self._stop_by: float | None = None
@@ -181,20 +174,20 @@ class Engine:
             self._vehicles.check_late(now=now)
         match item:
             case inputs.Packets():
-                self._reception.receive((item,), now=now)
+                self._receive((item,), now=now)
             case inputs.Committed(through=through):
                 self._submissions.committed(through, now=now)
                 self._vehicles.commit(now=now)
             case inputs.HaltsKept(through=through):
                 self._submissions.gate.halts_kept(through, now=now)
             case inputs.AtOnce(packets=several):
-                self._reception.receive(several, now=now)
+                self._receive(several, now=now)
             case inputs.LinkChanged(side=side):
                 self._intake.change_link(item)
                 self._gates.change_link(item)
                 self.signatures.change_link(item)
                 clients = side is LinkSide.CLIENTS
-                (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
+                (self._gcs if clients else self._vehicles).change_link(item, now=now)
             case inputs.KeysChanged():
                 gone = self.signatures.change_keys(item)
                 self._questions.keys_revoked(now=now)
@@ -204,7 +197,7 @@ class Engine:
             case inputs.PeerChanged():
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
-                self._vehicles.links.change_peer(item)
+                self._vehicles.change_peer(item)
                 if item.link in self._gcs.links:
                     self._passing.end(item.link, item.peer, now=now)
             case inputs.Congestion():
@@ -247,8 +240,8 @@ class Engine:
 
     def next_deadline(self) -> float | None:
         """Return when ``handle_deadline`` must be called next, or None if no timer is set."""
-        if self._vehicles.deadline_heap.touched:  # by ``_settle``, after it settled them
-            self._vehicles.deadline_heap.plan()
+        if self._vehicles.touched:  # by ``_settle``, after it settled them
+            self._vehicles.plan()
         due = self._timers.next_deadline()
         return None if due == inf else due
 
@@ -276,7 +269,7 @@ class Engine:
 
     def take_packets(self) -> list[Outgoing]:
         """Return the datagrams to send, in order."""
-        self.emergency_stop_packets = self._vehicles.deadline_heap.emergency_stop_packets
+        self.emergency_stop_packets = self._vehicles.emergency_stop_packets
         packets = self._packets.copy()
         self._packets.clear()  # clear in place: every PacketSender shares this list
         return packets
@@ -310,7 +303,7 @@ class Engine:
         """Return whether a client or a rover at an endpoint has sent a valid packet."""
         if client := self._gcs.client((link, peer)):
             return client.is_heard
-        return self._vehicles.links.has_vehicle_at(link, peer)
+        return self._vehicles.has_vehicle_at(link, peer)
 
     def reach(self, *, now: float) -> Reach:
         """Return which vehicles are heard, also those that another gateway has, and are ours."""
@@ -331,6 +324,130 @@ class Engine:
         """Until when ``emergency_stop_packets`` may leave, s."""
         return self._vehicles.lease.stop_until
 
+    def _receive(self, items: Sequence[Packets], *, now: float) -> None:
+        """Handle packets in the order of their arrival; those that halt a rover come first."""
+        received: list[Received] = []
+        others: list[Packets] = []
+        for item in items:
+            if item.link in self._gcs.links:
+                if item.link == FLEET_LINK:
+                    item = self._elsewhere.bring_back(item)
+                received += self._received(item, now=now)
+            else:
+                others.append(item)
+        if len(items) > 1:
+            received.sort(key=attrgetter("arrived"))
+        if len(received) > 1:
+            for each in self._halts_first(received):
+                self._gcs.hear_out(each, now=now)
+                self._receive_from_client(each, now=now)
+        elif received:
+            self._receive_from_client(received[0], now=now)
+        for item in others:
+            if self._vehicles.owns(item.link):
+                self._receive_from_vehicles(item, now=now)
+
+    def _received(self, item: Packets, *, now: float) -> list[Received]:
+        taken = self._intake.packets(self._gates.let_in(item, now=now), self._gcs.counts, now=now)
+        received: list[Received] = []
+        for peer, packet, arrived in taken:
+            if each := self._gcs.receive(item.link, peer, packet, arrived=arrived, now=now):
+                received.append(each)
+        return received
+
+    def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
+        for peer, packet, _ in self._intake.packets(item, self._vehicles.counts, now=now):
+            vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
+            while self._vehicles.gone:
+                self._forget(self._vehicles.gone.pop())
+            if vehicle is not None:
+                if self._restarts.begins_anew(packet, now=now):
+                    self._gcs.continue_numbers(packet)
+                if (
+                    self._vehicles.is_answer_to_us(packet)
+                    or packet.message_id == m.CommandAck.id
+                    or self._reports.replaces(packet)
+                ):
+                    self._publisher.withhold(packet)
+                else:
+                    is_stopped = vehicle.tasks.is_stopped
+                    shown = vehicle.shown.applied(packet, is_stopped=is_stopped, now=now)
+                    self._gcs.forward(shown, now=now)
+
+    def _halts_first(self, received: list[Received]) -> list[Received]:
+        """Move packets that start or drive a rover behind those that halt one.
+
+        The order is otherwise kept.
+        """
+        kinds = [self._kind_of(each.message) for each in received]
+        if Kind.HALT not in kinds:
+            return received
+        goes = [kind in (Kind.GO, Kind.MOTION) for kind in kinds]
+        return [received[number] for number in sorted(range(len(goes)), key=goes.__getitem__)]
+
+    def _kind_of(self, message: m.Message | None) -> Kind:
+        target = getattr(message, "target_system", 0)
+        is_of_all = target in (EVERYBODY, self._vehicles.our_address.system_id)
+        vehicle = (
+            next(iter(self._vehicles.all), None) if is_of_all else self._vehicles.look_at(target)
+        )
+        return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
+
+    def _stop_taken(self, vehicle: int, *, now: float) -> None:
+        """Obey the STOPs that came before this gateway got a vehicle, and that nobody obeyed."""
+        for received in self._elsewhere.stops_for(vehicle, now=now):
+            self._gcs.hear_out(received, now=now)
+            self._see_to(received, now=now)
+        self._elsewhere.obeyed(vehicle)
+
+    def _forget(self, vehicle: int) -> None:
+        """Forget a vehicle, which another gateway, or another vehicle, has the id of from now."""
+        self._desks.forget(vehicle)
+        self._reports.forget(vehicle)
+        self._restarts.forget(vehicle)
+
+    def _receive_from_client(self, received: Received, *, now: float) -> None:
+        if not self._door.may_pass(received, now=now) or self._elsewhere.takes(received, now=now):
+            return
+        if len(received.client.introduced) < len(self._vehicles.by_id):
+            self._publisher.welcome(received.client, now=now)
+        if getattr(received.message, "target_system", None) == EVERYBODY:
+            for each in self._broadcasts.addressed(received):
+                self._see_to(each, now=now)
+        else:
+            self._see_to(received, now=now)
+
+    def _see_to(self, received: Received, *, now: float) -> None:
+        client, packet, message = received.client, received.packet, received.message
+        if isinstance(message, m.CommandLong | m.CommandInt):
+            self._commands.receive(client, packet, command_of(message), now=now)
+        elif isinstance(message, (m.CommandCancel, m.SetMode)):
+            if (vehicle := self._vehicles.get(message.target_system)) is None:
+                return
+            if isinstance(message, m.CommandCancel):
+                source, command = packet.source, message.command
+                self._control.cancel_latest(client, vehicle, source, command, now=now)
+            else:
+                mode = int(message.custom_mode)
+                asked = MessageRequest.of(client, vehicle, packet, mode, now=now)
+                self._modes.heard(asked, now=now)
+        elif isinstance(message, m.RequestDataStream):
+            self._displays.set_streams(client, message)
+        elif isinstance(message, m.SetupSigning):
+            self._setup.receive(client, message, now=now)
+        elif isinstance(message, MissionMessage) and self._desks.receive(
+            client, packet, message, now=now
+        ):
+            return
+        else:
+            if isinstance(message, m.Heartbeat) and packet.system_id in self._vehicles.by_id:
+                return  # of a rover's component: back by another link, it would be on its side
+            if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
+                self._operator.receive(message, now=now)
+            elif isinstance(message, ParamMessage):
+                self._parameters.receive(client, packet, message, now=now)
+            self._passing.forward(client, packet, message, now=now)
+
     def _take_over(self, vehicles: Sequence[int], restored: Restored, *, now: float) -> None:
         """Serve vehicles that this gateway has got, with their tasks and plans."""
         self._fleet.take_over(restored, now=now)
@@ -340,7 +457,7 @@ class Engine:
         self.signatures.take_lead(restored.signing_lead)
         self._vehicles.take(vehicles, now=now)
         for vehicle in vehicles:
-            self._reception.stop_taken(vehicle, now=now)
+            self._stop_taken(vehicle, now=now)
 
     def _let_go(self, vehicles: Sequence[int], *, now: float) -> None:
         """Forget vehicles that another gateway hears, unless something came between."""
@@ -350,7 +467,7 @@ class Engine:
             self._deduplicator.forget_vehicle(vehicle, tasks)
             self._assignments.forget(vehicle, tasks)
             self._plans.forget(vehicle)
-            self._reception.forget(vehicle)
+            self._forget(vehicle)
             self._gcs.forget_vehicle(vehicle, tasks)
 
     def _tell_statuses(self, *, now: float) -> None:
@@ -370,9 +487,7 @@ class Engine:
         for system_id in room.take_woken() if room.woken else ():
             if woken := self._vehicles.get(system_id):
                 woken.joint.wake(now=now)
-        for vehicle in (
-            self._vehicles.deadline_heap.settle() if self._vehicles.deadline_heap.touched else ()
-        ):
+        for vehicle in self._vehicles.settle() if self._vehicles.touched else ():
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
                 deliver(self._gcs, self._submissions, vehicle, answered, now=now)
@@ -407,15 +522,12 @@ class Engine:
         self._settings = settings
         self.signatures.apply(settings.signing.window)
         self._gates.apply(settings.clients)
-        self._fleet.apply(settings)
-        self._gcs.apply(settings)
-        self._vehicles.apply(settings)
-        self._submissions.apply(settings)
-        self._assignments.apply(settings)
-        self._any.apply(settings)
-        self._desks.apply(settings)
-        self._reports.apply(settings)
-        self._operator.apply(settings)
+        for apply in (
+            *(self._fleet.apply, self._gcs.apply, self._vehicles.apply, self._submissions.apply),
+            *(self._assignments.apply, self._any.apply, self._desks.apply, self._reports.apply),
+            self._operator.apply,
+        ):
+            apply(settings)
 
     def _shut_down(self, *, now: float) -> None:
         self._submissions.close()

@@ -34,5 +34,5 @@ class TelemetryRates:
                     wished = client.thinner.wishes(vehicle.system_id, commands=commands)
                     for number, interval in wished.items():
                         least[number] = min(interval, least.get(number, interval))
-            spare = self._vehicles.links.link_budget(vehicle, now=now).spare
+            spare = self._vehicles.link_budget(vehicle, now=now).spare
             vehicle.requests.intervals.set_wishes(granted(wishes[True], wishes[False], spare=spare))

@@ -26,7 +26,7 @@ MOST_CLIENTS = 64  # whose requests are counted
 class LinkBudget:
     """The budget of one endpoint; ``budget`` as configured, ``capacity`` in bytes/s."""
 
-    def __init__(self, *, budget: float, capacity: float | None, vehicles: int, now: float) -> None:
+    def __init__(self, budget: float, capacity: float | None, *, vehicles: int, now: float) -> None:
         self._carries = budget if capacity is None else min(budget, capacity)
         #: bytes/s that may be requested of each vehicle beyond the server's own needs
         self.spare = spare_of(budget, capacity, vehicles=vehicles)
@@ -35,9 +35,6 @@ class LinkBudget:
         self._rate = max(LEAST, OWN_SHARE * rate)  # bytes/s, of one client
         self._own: dict[Hashable, TokenBucket] = {}
         self._listed_until = -inf
-
-    def __repr__(self) -> str:
-        return f"LinkBudget({self._carries:g} bytes/s, {self.spare:g} to spare)"
 
     def why_not(
         self,
@@ -51,9 +48,13 @@ class LinkBudget:
         """Return why an observer's request may not be forwarded now, or None if it may."""
         if not _asks_for_much(message):
             size = len(packet.raw) + _size_of_answer(message)
-            may_ask = self._of(who, now=now).take(tokens=size, now=now)
-            may_ask = may_ask and self._questions.take(tokens=size, now=now)
-            return None if may_ask else "may not send so many requests over a slow link"
+            own = self._own.get(who) or TokenBucket(
+                rate=self._rate, burst=WITHIN * self._rate, now=now
+            )
+            keep_latest(self._own, who, own, most=MOST_CLIENTS)
+            if own.take(tokens=size, now=now) and self._questions.take(tokens=size, now=now):
+                return None
+            return "may not send so many requests over a slow link"
         takes = LIST / (LIST_SHARE * self._carries)
         if is_driven and takes > SLOW_LIST:
             return "may not ask for a list over a slow link during a task"
@@ -61,14 +62,6 @@ class LinkBudget:
             return "may ask for only one list at a time over a slow link"
         self._listed_until = now + takes
         return None
-
-    def _of(self, who: Hashable, *, now: float) -> TokenBucket:
-        """Return the token bucket of one client."""
-        bucket = self._own.get(who)
-        if bucket is None:
-            bucket = TokenBucket(rate=self._rate, burst=WITHIN * self._rate, now=now)
-        keep_latest(self._own, who, bucket, most=MOST_CLIENTS)
-        return bucket
 
 
 def _asks_for_much(message: m.Message) -> bool:
