@@ -43,10 +43,10 @@ def spare_of(budget: float, capacity: float | None, *, vehicles: int) -> float:
 
 def granted(commanding: Intervals, observing: Intervals, *, spare: float) -> Intervals:
     """Return what a vehicle is asked for beyond the server's own needs."""
-    rates = {number: 1 / interval for number, interval in WANTED.items()}
+    own = {number: 1 / interval for number, interval in WANTED.items()}
+    rates = own.copy()
     _raise(rates, commanding, shortest=SHORTEST, most=(1 - OBSERVERS_SHARE) * spare)
     _raise(rates, observing, shortest=OBSERVERS_SHORTEST, most=OBSERVERS_SHARE * spare)
-    own = {number: 1 / interval for number, interval in WANTED.items()}
     return {
         number: round(1 / rate, 3) for number, rate in rates.items() if rate > own.get(number, 0.0)
     }

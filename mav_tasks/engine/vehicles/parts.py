@@ -152,7 +152,7 @@ class Parts:
             in_control=control.in_control,
             refusal=REFUSALS[control.refused],
             is_not_ready=control.is_not_ready,
-            why_not_ready=self.failsafes.texts.why_not_ready(now=now),
+            why_not_ready=self.failsafes.why_not_ready(now=now),
             motion=where.motion.latest(),
             still=where.motion.is_still(now=now),
             other_controller=self.authority.since_other(now=now) < watch.other_controller,

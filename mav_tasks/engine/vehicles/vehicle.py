@@ -30,11 +30,11 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.battery import charge_of
 from mav_tasks.services.command_sender import Standing
 from mav_tasks.services.heartbeat import HeartbeatMonitor, kind_of
 from mav_tasks.services.identity import identity_of, uid_of
 from mav_tasks.services.persona import Persona
+from mav_tasks.services.sys_status import charge_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.halts import LastHalt
