@@ -95,8 +95,7 @@ class Timers:
     def forget(self, timer: Timer) -> None:
         """Cancel a timer for good, so that nothing refers to its part any more."""
         timer.at = timer.entered = inf
-        self.heap[:] = [entry for entry in self.heap if entry[3] is not timer]
-        heapify(self.heap)
+        self._forget_outdated()
 
     def rhythm(self, turn: Turn, do: Effect, *, period: float, now: float) -> Timer:
         """Return a timer that is due now and each ``period``; missed calls are not made up for."""

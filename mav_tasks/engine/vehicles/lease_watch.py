@@ -23,7 +23,7 @@ class LeaseWatch(Fence):
     def __init__(self, timers: Timers, *, is_shared: bool) -> None:
         """``is_shared``: the vehicles are a fleet's, so that nothing is permitted yet."""
         super().__init__(is_shared, -inf if is_shared else inf, -inf if is_shared else inf)
-        self._timer = timers.timer(Turn.LINKS, self._end)
+        self._timer = timers.timer(Turn.LINKS, self._look)
         #: whether vehicles may be moved
         self.is_trusted = not is_shared
         self._is_leaving = False
@@ -36,27 +36,24 @@ class LeaseWatch(Fence):
 
     def change(self, lease: LeaseChanged, *, now: float) -> None:
         """Take a new or renewed lease, or one that has ended."""
-        was_trusted = self.is_trusted
-        self.is_trusted = now < lease.move_until and not self._is_leaving
-        self.stop_until = lease.stop_until
         self.relays_until = -inf if self._is_leaving else lease.move_until
-        self.until = lease.move_until if self.is_trusted else lease.stop_until
-        self._timer.set(lease.move_until if self.is_trusted else inf)
-        if was_trusted is not self.is_trusted:
-            self._back_at = now if self.is_trusted else self._back_at
-            self.on_change(now=now)
+        self.stop_until = lease.stop_until
+        self._look(now=now)
+
+    def leave(self, *, now: float) -> None:
+        """Only stop the vehicles from here on: this gateway leaves the fleet."""
+        self._is_leaving, self.is_trusted, self.relays_until = True, False, -inf
+        self._look(now=now)
 
     def has_silenced(self, *, now: float) -> bool:
         """Return whether vehicles may show a failsafe because no set-point was permitted."""
         return self.is_shared and (not self.is_trusted or now - self._back_at <= SHOWN)
 
-    def leave(self) -> None:
-        """Only stop the vehicles from here on: this gateway leaves the fleet."""
-        self._is_leaving, self.is_trusted = True, False
-        self.until, self.relays_until = self.stop_until, -inf
-        self._timer.set(inf)
-
-    def _end(self, *, now: float) -> None:
-        """Only stop the vehicles from here on: the lease was not renewed in time."""
-        self.is_trusted, self.until = False, self.stop_until
-        self.on_change(now=now)
+    def _look(self, *, now: float) -> None:
+        """Look whether vehicles may be moved, or only stopped: it was not renewed in time."""
+        was_trusted, self.is_trusted = self.is_trusted, now < self.relays_until
+        self.until = self.relays_until if self.is_trusted else self.stop_until
+        self._timer.set(self.relays_until if self.is_trusted else inf)
+        if was_trusted is not self.is_trusted:
+            self._back_at = now if self.is_trusted else self._back_at
+            self.on_change(now=now)

@@ -25,7 +25,9 @@ from enum import Enum, IntEnum, auto
 from math import inf
 from typing import NamedTuple
 
-from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.parts import Parts
+from mav_tasks.services.phase import Phase
+from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 
 NEARLY_STANDS = 0.1  # m/s; a vehicle that rolls on in HOLD from this speed rolls at most 5 cm
 SWINGS = 1.0  # s in which a car may swing back, up to 0.15 m/s, after its task's zeros (ArduPilot)
@@ -44,6 +46,8 @@ LATELY = 1.0  # s, in which the fastest speed asked for counts: a rover slows do
 #: times the speed asked for, plus m/s. Measured: 1.37 times on a healthy rover, and 0.9 m/s where
 #: 0.2 was asked for on a PX4 whose speed loop had wound up (RO_SPEED_I 0.5)
 OVERSHOOT, NOISE = 2.0, 0.6
+#: what it stands for while a task continues or starts
+GOES_ON = (DemandKind.TAKE, DemandKind.DRIVE)
 LASTS = 0.2  # s that it must last; with the speed's window it is seen within 0.5 s
 
 
@@ -77,28 +81,12 @@ class Found(NamedTuple):
     words: str = ""
 
 
-class Told(NamedTuple):
-    """What the vehicle is told, and who controls it."""
-
-    forward: float  # m/s asked for now
-    moves: bool  # we ask for a velocity other than zero, and it is in our control
-    is_ours: bool  # we drive it, hand it back or stop it
-    is_stopping: bool  # by STOP, or by a halt like it
-    rolls_out: bool  # in our mode, it rolls on or swings back before it stands
-    may_drive: bool  # it is in our control, and STOP is not latched
-    goes_on: bool  # it stands for a task that continues or starts
-    is_released: bool  # we send it nothing any more
-    is_held: bool  # it shows HOLD
-    armed: bool
-    still: bool
-    heard: bool
-
-
 class MotionGuard:
     """Guards the motion of one vehicle, and makes it stand."""
 
-    def __init__(self, motion: MotionMonitor) -> None:
-        self._motion = motion
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
+        self._motion = parts.where.motion
         self.step = Step.OFF
         self._began = 0.0
         self._speeds: deque[tuple[float, float]] = deque()  # (s, m/s) of the last NO_EFFECT s
@@ -142,55 +130,63 @@ class MotionGuard:
             return False
         return min(abs(moved[1]), abs(motion.forward)) > (ROLLS if rolls_out else MOVES)
 
-    def look(self, told: Told, *, now: float) -> list[Found]:
+    def look(self, demand: Demand, seen: VehicleView, *, now: float) -> list[Found]:
         """Return the measures that are due now, in order."""
+        control, asked = self._parts.control, demand.velocity
         moved = self._displacement(now=now)
         speed = None if moved is None else moved[0]
         found = []
-        if told.may_drive and (words := self._why_too_fast(told.forward, speed, now=now)):
+        may_drive = control.in_control and not self._parts.tasks.is_stopped
+        if may_drive and (words := self._why_too_fast(asked.forward, speed, now=now)):
             found.append(Found(Measure.STOP_TASK, words))
-        if told.moves:
+        is_ours = control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING)
+        if control.in_control and not asked.is_zero:
             self.told_to_move(now=now)
             self.step = Step.OFF
-        elif told.is_ours and told.armed and not told.still:
+        elif is_ours and self._parts.monitor.armed and not seen.still:
             self.begin(now=now)
-        if self.is_on and (measure := self._climb(told, speed, now=now)):
+        if self.is_on and (measure := self._climb(demand, seen, speed, now=now)):
             found.append(measure)
         return found
 
-    def _climb(self, told: Told, speed: float | None, *, now: float) -> Found | None:
+    def _climb(
+        self, demand: Demand, seen: VehicleView, speed: float | None, *, now: float
+    ) -> Found | None:
         """Go on to the next step if it is due, and return what follows."""
-        if told.still or not told.heard or (told.is_released and not told.is_held):
-            self.step = Step.OFF
+        parts, persona = self._parts, self._parts.persona
+        is_held = parts.monitor.custom_mode == persona.hold_mode
+        if seen.still or not seen.heard or not (parts.control.is_engaged or is_held):
+            self.step = Step.OFF  # somebody else drives it
             return None
-        if speed is None and not told.is_stopping:
+        is_stopping = parts.control.phase is Phase.STOPPING
+        if speed is None and not is_stopping:
             return None  # keep sending zeros, then HOLD: a car might roll on in HOLD
         self._note_speed(speed, now=now)
-        if told.is_held:
+        if is_held:
             self._hold_seen_at = min(self._hold_seen_at, now)
-        is_own = told.goes_on and not told.is_stopping
-        patience, moves = (SWINGS, RUNS_ON) if is_own else (NO_EFFECT, MOVES)
+        goes_on = demand.kind in GOES_ON
+        patience, moves = (NO_EFFECT, MOVES) if is_stopping or not goes_on else (SWINGS, RUNS_ON)
         unslowed = now - self._slowed_at
         if self.step is Step.SETPOINTS:
             has_effect = speed is not None and (speed <= moves or unslowed < patience)
             if now - self._began >= REACTION + patience and not has_effect:
                 self.step = Step.HOLD
                 return Found(Measure.HOLD)
-            if told.is_held:
+            if is_held:
                 self.step = Step.HOLD
+        if speed is None:
+            return None
         if (
             self.step is Step.HOLD
-            and now - self._hold_seen_at >= (self._motion.watch.disarm_moving or inf)
+            and now - self._hold_seen_at >= (parts.settings.watch.disarm_moving or inf)
             and unslowed >= ROLLS_OUT
-            and speed is not None
             and speed > MOVES
         ):
             self.step = Step.DISARM
             words = f"still moves in HOLD ({speed:.1f} m/s): disarmed"
-            return Found(Measure.DISARM, words) if told.armed else None
-        ends = told.is_stopping or (told.rolls_out and not told.goes_on)
-        is_slow = speed is not None and speed < NEARLY_STANDS
-        return Found(Measure.HOLD_NOW) if ends and is_slow else None
+            return Found(Measure.DISARM, words) if parts.monitor.armed else None
+        ends = is_stopping or (persona.rolls_out and not goes_on)
+        return Found(Measure.HOLD_NOW) if ends and speed < NEARLY_STANDS else None
 
     def _note_speed(self, speed: float | None, *, now: float) -> None:
         if speed is None:

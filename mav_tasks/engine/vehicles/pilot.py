@@ -8,13 +8,12 @@ from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.motion_guard import Found, Measure, MotionGuard, Told
+from mav_tasks.engine.vehicles.motion_guard import GOES_ON, Found, Measure, MotionGuard
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
 from mav_tasks.services.offboard import REGAINED_UNSEEN
 from mav_tasks.services.orders import Posture, Speeds
 from mav_tasks.services.phase import Phase
-from mav_tasks.tasks.driving.guidance import ZERO
 from mav_tasks.tasks.goal import ends_at_home
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Task
@@ -24,7 +23,6 @@ from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 UNSEEN_STOP = 3.0
 SHOWS_AGAIN = 1.5  # s after a gap, within which the next 1 Hz heartbeat comes
 BRAKES_FOR = 8.0  # s of set-points before the HOLD of a STOP, at most; the longest stop took 4 s
-GOES_ON = (DemandKind.TAKE, DemandKind.DRIVE)
 
 
 class Seen(NamedTuple):
@@ -45,7 +43,7 @@ class Pilot:
         #: when the next set-point is due
         self.clock = SetpointClock(parts.system_id, period=parts.settings.watch.setpoint_period)
         #: checks that it moves as it was told to
-        self.guard = MotionGuard(parts.where.motion)
+        self.guard = MotionGuard(parts)
         self._is_closing = False
         self._regained_at = -inf  # s, when it was met driving
         self._is_back_home = False  # its last task returned home: disarm it even if others wait
@@ -75,7 +73,7 @@ class Pilot:
                 seen = self._view(now)
         self._obey(demand, seen, now=now)
         found = []
-        for each in self.guard.look(self._told(demand, seen), now=now):
+        for each in self.guard.look(demand, seen, now=now):
             event = self._take_measure(each, demand, now=now)
             if event is not None:
                 found.append(event)
@@ -205,27 +203,6 @@ class Pilot:
                 self.begin_stop(brakes=True, now=now)
             case DemandKind.STOP | DemandKind.HALT:
                 control.stop(still=seen.still, heard=seen.heard, now=now)
-
-    def _told(self, demand: Demand, seen: VehicleView) -> Told:
-        """Return what the vehicle is told, for the motion guard."""
-        parts, wanted = self._parts, ZERO
-        control, persona = parts.control, parts.persona
-        if demand.kind is DemandKind.DRIVE:
-            wanted = demand.velocity
-        return Told(
-            forward=wanted.forward,
-            moves=control.in_control and not wanted.is_zero,
-            is_ours=control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING),
-            is_stopping=control.phase is Phase.STOPPING,
-            rolls_out=persona.rolls_out,
-            may_drive=control.in_control and not parts.tasks.is_stopped,
-            goes_on=demand.kind in GOES_ON,
-            is_released=not control.is_engaged,
-            is_held=parts.monitor.custom_mode == persona.hold_mode,
-            armed=parts.monitor.armed,
-            still=seen.still,
-            heard=seen.heard,
-        )
 
     def _take_measure(self, found: Found, demand: Demand, *, now: float) -> Seen | None:
         """Climb the stop ladder. Return an event if a task is concerned, for the control table."""

@@ -11,7 +11,6 @@ from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged, Pl
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
-from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.system_ids import NANO, Way
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.latest import keep_latest
@@ -20,6 +19,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import INTERVAL, gcs_heartbeat
+from mav_tasks.services.rate_budget import LinkBudget
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
@@ -66,7 +66,7 @@ class VehicleLinks:
         self.all = self._vehicles.values()
         #: the address under which the server speaks to vehicles
         self.our_address = _own_address(self._settings)
-        self._noted: set[str] = set()
+        self._noted: set[tuple[int, str]] = set()
         self._asked: deque[int] = deque(maxlen=ASKED)  # time stamps of our TIMESYNC requests, ns
         self._question = m.Timesync(0, 0)  # refilled for each request
         self._links: dict[str, Link] = {}
@@ -140,7 +140,7 @@ class VehicleLinks:
 
     def note_once(self, system_id: int, text: str, *, now: float) -> bool:
         """Report a text about a vehicle unless it was reported before; return whether it is new."""
-        key = f"{system_id} {text}"
+        key = system_id, text
         is_new = key not in self._noted and len(self._noted) < MOST_NOTES
         if is_new:
             self._noted.add(key)

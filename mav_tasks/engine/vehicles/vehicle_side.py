@@ -85,8 +85,7 @@ class VehicleSide(VehicleLinks):
         self.by_id: Mapping[int, Vehicle] = self._vehicles
         #: returns a vehicle, read-only
         self.look_at = self._vehicles.get
-        #: those that it has, and since when; None: all
-        self._ours: dict[int, float] | None = {} if self.lease.is_shared else None
+        self._ours: dict[int, float] = {}  # those that this gateway of a fleet has, and since when
         self._strangers = Strangers()
         #: the ids at which another vehicle answers now; the reader clears it
         self.gone: list[int] = []
@@ -138,10 +137,8 @@ class VehicleSide(VehicleLinks):
 
     def addressed_by(self, system_id: int) -> list[Vehicle]:
         """Return the vehicles that a target_system addresses; 0 addresses all of them."""
-        if system_id:
-            vehicle = self.get(system_id)
-            return [] if vehicle is None else [vehicle]
-        return [vehicle for vehicle in map(self.get, sorted(self._vehicles)) if vehicle is not None]
+        numbers = (system_id,) if system_id else sorted(self._vehicles)
+        return [vehicle for vehicle in map(self.get, numbers) if vehicle is not None]
 
     def stop_unheard(self, system_id: int, *, clear: bool, actor: str, now: float) -> list[int]:
         """Latch STOP for vehicles of an earlier run that were not heard yet. Return their ids.
@@ -169,7 +166,6 @@ class VehicleSide(VehicleLinks):
 
         One that was driven is stopped at once if its last heartbeat came just now.
         """
-        assert self._ours is not None, "a server without a fleet has all vehicles"
         for vehicle in vehicles:
             self._ours[vehicle] = now
             if beat := self._strangers.take_beat(vehicle, now=now):
@@ -180,18 +176,16 @@ class VehicleSide(VehicleLinks):
         since = now - self._settings.watch.heartbeat_lost
         heard = {each.system_id for each in self.all if each.is_heard(now=now)}
         heard |= {number for number, beat in self._strangers.beats.items() if beat.at >= since}
-        ours = self._ours or {}
-        strays = {each for each in ours if each not in heard and self.is_stray(each, now=now)}
-        return Reach(frozenset(heard), frozenset(ours), frozenset(strays))
+        silent = self._ours.keys() - heard
+        strays = frozenset(each for each in silent if self._is_stray(each, now=now))
+        return Reach(frozenset(heard), frozenset(self._ours), strays)
 
-    def is_stray(self, system_id: int, *, now: float) -> bool:
+    def _is_stray(self, system_id: int, *, now: float) -> bool:
         """Return whether a vehicle that this gateway has is silent, idle, and stored as it is.
 
         Zeros and HOLD are still sent to it, because it has not shown HOLD, if a task was driving
         it: they go on for ever, and keep nobody from it. Its next gateway stops it, too.
         """
-        if self._ours is None or system_id not in self._ours:
-            return False
         vehicle = self._vehicles.get(system_id)
         heard_at = self._ours[system_id] if vehicle is None else vehicle.heard_at
         if now - heard_at < max(GONE, self._settings.watch.heartbeat_lost):
@@ -215,12 +209,9 @@ class VehicleSide(VehicleLinks):
 
     def forget(self, system_id: int) -> None:
         """Forget a vehicle, which another gateway may have from here on."""
-        assert self._ours is not None, "a server without a fleet has all vehicles"
         del self._ours[system_id]
         self._drop(system_id)
-        self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
-        if self._answer is not None and self._answer.system_id == system_id:
-            self._answer = None
+        self._noted = {each for each in self._noted if each[0] != system_id}
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle that has a task of a revoked key, even if another key's task drives.
@@ -250,12 +241,10 @@ class VehicleSide(VehicleLinks):
     def shut_down(self, *, now: float) -> None:
         """Stop what we drive: the server ends. In a fleet, other gateways get the vehicles."""
         if self.lease.is_shared:
-            self.lease.leave()
+            self.lease.leave(now=now)
         for vehicle in self.addressed_by(0):
-            if self.lease.is_shared:
-                vehicle.joint.leave(now=now)
-            else:
-                vehicle.joint.shut_down(now=now)
+            joint = vehicle.joint
+            (joint.leave if self.lease.is_shared else joint.shut_down)(now=now)
 
     def commit(self, *, now: float) -> None:
         """Start the tasks that waited only for events that are durable now."""
@@ -285,7 +274,7 @@ class VehicleSide(VehicleLinks):
             return None
         place, number = (link, peer), packet.system_id
         if packet.source == self.our_address or packet.message_id in SETPOINTS:
-            if self._ours is not None and isinstance(message, m.Heartbeat | m.Timesync):
+            if self.lease.is_shared and isinstance(message, m.Heartbeat | m.Timesync):
                 return None  # another gateway's, which listens here, too
             self._note_intruder(place, packet, message, now=now)
             return None
@@ -298,7 +287,7 @@ class VehicleSide(VehicleLinks):
                 self._strangers.moved[number, message.id] = Moved(place, message, now)
             if beat is None:
                 return None
-            if self._ours is not None and number not in self._ours:
+            if self.lease.is_shared and number not in self._ours:
                 if self._persona_of(beat) is not None:
                     self._strangers.beats[number] = beat  # another gateway's, which it may get
                 return None
@@ -423,7 +412,7 @@ class VehicleSide(VehicleLinks):
             may_arm=self._may_arm(place[0]),
             now=now,
         )
-        if self._ours is not None:
+        if self.lease.is_shared:
             vehicle.parts.listens_until = now + LISTENS
         self._vehicles[number] = vehicle
         self._budgets.clear()
