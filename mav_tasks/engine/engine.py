@@ -153,7 +153,7 @@ class Engine:
         self._restarts = RestartWatch()
         #: figures for metrics
         self.figures = Figures(vehicles, gcs, self._gates, self._fleet, registry)
-        self._stop_by: float | None = None
+        self._stop_by = inf  # by then, vehicles have stopped, or the server ends without
         self._stopped = False
         #: zero and HOLD for every driven vehicle, as of the last ``take_packets``; the runner sends
         #: them if the engine raises
@@ -169,9 +169,7 @@ class Engine:
 
     def handle(self, item: Input, *, now: float) -> None:
         """Process one input."""
-        self.signatures.now = now
-        if self._timers.not_before + self._settings.watch.late_tick < now:
-            self._vehicles.check_late(now=now)
+        self._begin(now=now)
         match item:
             case inputs.Packets():
                 self._receive((item,), now=now)
@@ -247,9 +245,7 @@ class Engine:
 
     def handle_deadline(self, *, now: float) -> None:
         """Do everything due by ``now``; the call may be late, or needless."""
-        self.signatures.now = now
-        if self._timers.not_before + self._settings.watch.late_tick < now:
-            self._vehicles.check_late(now=now)
+        self._begin(now=now)
         due = self._timers.take_due(now=now)
         for timer in due:
             if timer.turn < Turn.SETTLING:
@@ -324,6 +320,12 @@ class Engine:
         """Until when ``emergency_stop_packets`` may leave, s."""
         return self._vehicles.lease.stop_until
 
+    def _begin(self, *, now: float) -> None:
+        """Note the time; after a delay, and before anything else, stop what drove on without us."""
+        self.signatures.now = now
+        if self._timers.not_before + self._settings.watch.late_tick < now:
+            self._vehicles.check_late(now=now)
+
     def _receive(self, items: Sequence[Packets], *, now: float) -> None:
         """Handle packets in the order of their arrival; those that halt a rover come first."""
         received: list[Received] = []
@@ -344,7 +346,7 @@ class Engine:
         elif received:
             self._receive_from_client(received[0], now=now)
         for item in others:
-            if self._vehicles.owns(item.link):
+            if item.link in self._vehicles.links:
                 self._receive_from_vehicles(item, now=now)
 
     def _received(self, item: Packets, *, now: float) -> list[Received]:
@@ -492,7 +494,7 @@ class Engine:
             for answered in vehicle.requests.take_answers():
                 deliver(self._gcs, self._submissions, vehicle, answered, now=now)
             self._reports.tell_unperformed(vehicle, now=now)
-        if self._stop_by is not None:
+        if self._stop_by < inf:
             self._note_stopped(now=now)
         for refused in signatures.take_refused() if signatures.refused else ():
             self._registry.record(refused)
@@ -536,7 +538,6 @@ class Engine:
         self._vehicles.shut_down(now=now)
 
     def _note_stopped(self, *, now: float) -> None:
-        assert self._stop_by is not None
         rolling = tuple(v.system_id for v in self._vehicles.all if v.control.is_engaged)
         if not self._stopped and (not rolling or now >= self._stop_by):
             self._stopped = True

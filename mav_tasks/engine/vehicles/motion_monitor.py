@@ -70,6 +70,7 @@ class MotionMonitor:
         self._position_at = 0.0
         self._attitude: Attitude | None = None
         self._attitude_at = 0.0
+        self._is_slow = False  # as it reports
         self._moved_at = 0.0  # when it last reported a speed
         self._latest: Motion | None = None
         self._samples: deque[Sample] = deque()
@@ -96,11 +97,16 @@ class MotionMonitor:
             self._position = message
         else:
             self._attitude, self._attitude_at = message, sent_at
-        if not self._is_slow():
-            self._moved_at = now
-        position, attitude = self._position, self._attitude
+        position, attitude, watch = self._position, self._attitude, self.watch
         if position is None or attitude is None:
+            self._moved_at = now
             return heard
+        self._is_slow = (
+            hypot(position.vx, position.vy) < watch.still_speed
+            and abs(attitude.yawspeed) < watch.still_turn_rate
+        )
+        if not self._is_slow:
+            self._moved_at = now
         north, east = cos(attitude.yaw), sin(attitude.yaw)
         self._latest = Motion(
             pose=Pose(position.x, position.y, attitude.yaw),
@@ -132,7 +138,7 @@ class MotionMonitor:
         if abs(motion.yaw_rate) >= turn_rate:  # at rest, 1.4 deg/s at most was measured
             return False
         way, time = min(MOST_WAY, max(LEAST_WAY, MARGIN * self._way)), watch.still_time
-        if self._is_slow() and now - self._moved_at >= time:  # does the displacement agree?
+        if self._is_slow and now - self._moved_at >= time:  # does the displacement agree?
             most = 1.2 * max(watch.still_speed, way) * time
             if self._is_within(time, way=most, turn=2 * turn_rate * time, now=now):
                 return True
@@ -177,15 +183,6 @@ class MotionMonitor:
             last is not None
             and (message.x, message.y) == (last.x, last.y)
             and hypot(message.vx, message.vy) >= self.watch.still_speed
-        )
-
-    def _is_slow(self) -> bool:
-        position, attitude = self._position, self._attitude
-        return (
-            position is not None
-            and attitude is not None
-            and hypot(position.vx, position.vy) < self.watch.still_speed
-            and abs(attitude.yawspeed) < self.watch.still_turn_rate
         )
 
     def _keep(self, motion: Motion, *, now: float) -> None:

@@ -69,7 +69,8 @@ class VehicleLinks:
         self._noted: set[tuple[int, str]] = set()
         self._asked: deque[int] = deque(maxlen=ASKED)  # time stamps of our TIMESYNC requests, ns
         self._question = m.Timesync(0, 0)  # refilled for each request
-        self._links: dict[str, Link] = {}
+        #: the vehicle links that are up, by name
+        self.links: dict[str, Link] = {}
         self._outlets: dict[Place, PacketSender] = {}  # kept, because their numbering continues
         #: the places at which a vehicle's id is heard
         self._ways: dict[tuple[int, Place], Way] = {}
@@ -85,7 +86,7 @@ class VehicleLinks:
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
         """Add a link that came up; remove one that went down."""
-        old = self._links.pop(change.link, None)
+        old = self.links.pop(change.link, None)
         if old is not None:
             old.heartbeat.set(inf)
         if not change.up:
@@ -96,11 +97,11 @@ class VehicleLinks:
         outlets = {peer: self._outlet(change.link, peer) for peer in (*change.peers, *known)}
         beat = partial(self._beat, outlets)
         heartbeat = self._timers.rhythm(Turn.LINKS, beat, period=INTERVAL, now=now)
-        self._links[change.link] = Link(change.is_local, change.capacity, heartbeat, outlets)
+        self.links[change.link] = Link(change.is_local, change.capacity, heartbeat, outlets)
 
     def change_peer(self, change: PeerChanged) -> None:
         """Send to a peer that connected; one that is gone may come back at another place."""
-        link, place = self._links.get(change.link), (change.link, change.peer)
+        link, place = self.links.get(change.link), (change.link, change.peer)
         if link is None:
             return
         if not change.up:
@@ -115,16 +116,12 @@ class VehicleLinks:
         """Return whether one of our vehicles is at an endpoint."""
         return bool(self._at((link, peer)))
 
-    def owns(self, link: str) -> bool:
-        """Return whether a link of this name is a vehicle link."""
-        return link in self._links
-
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
         """Return what the link to a vehicle carries, shared by all vehicles at its endpoint."""
         place = vehicle.requests.place
         budget = self._budgets.get(place)
         if budget is None:
-            link, most = self._links.get(place[0]), self._settings.clients.telemetry_budget
+            link, most = self.links.get(place[0]), self._settings.clients.telemetry_budget
             capacity, vehicles = None if link is None else link.capacity, len(self._at(place))
             budget = LinkBudget(most, capacity, vehicles=vehicles, now=now)
             self._budgets[place] = budget
@@ -174,7 +171,7 @@ class VehicleLinks:
 
     def _meets(self, place: Place) -> PacketSender | None:
         """Return the sender to a vehicle's endpoint; None: the link is full, or down."""
-        link = self._links.get(place[0])
+        link = self.links.get(place[0])
         if link is None or (place[1] not in link.outlets and len(link.outlets) >= MAX_PEERS):
             return None
         link.outlets[place[1]] = self._outlet(*place)
@@ -190,7 +187,7 @@ class VehicleLinks:
     def _may_arm(self, link: str) -> bool:
         """Return whether we may arm vehicles on a link of this name."""
         arming = self._settings.arming
-        return arming == "server" or (arming == "auto" and self._links[link].is_local)
+        return arming == "server" or (arming == "auto" and self.links[link].is_local)
 
     def _way(self, system_id: int, place: Place, *, now: float) -> Way:
         """Return what is known about a place at which the id of a vehicle is heard."""
@@ -225,22 +222,22 @@ class VehicleLinks:
             why = NO_KEY
         elif not way.is_same and is_another and (way.is_same is False or now > way.first_at + SAYS):
             why = ". Give that one another id"
-        outlets, outlet = self._links[link].outlets, self._outlet(link, peer)
+        outlets, outlet = self.links[link].outlets, self._outlet(link, peer)
         if why:
             words = f"shares its id with a rover at {where}: ignored{why}"
             self.note_once(number, words, now=now)
             vehicle.tasks.twin_heard_at = now
         elif len(outlets) < MAX_PEERS or peer in outlets:
-            if is_gone or is_better if way.is_same else is_gone and is_beat and not is_another:
+            moves = is_gone or is_better if way.is_same else is_gone and is_beat and not is_another
+            if moves or way.is_same:
                 outlets[peer] = outlet
+            if moves:
                 vehicle.move_to(outlet, may_arm=self._may_arm(link), is_same=bool(way.is_same))
                 self._budgets.clear()
                 self._ways.pop((number, old), None)
                 self._forget_if_empty(old)
                 self._registry.record(VehicleSeen(number, f"is now at {where}", now))
                 return True
-            if way.is_same:
-                outlets[peer] = outlet
             if way.is_same and not was_same:
                 self._registry.record(VehicleSeen(number, f"is also heard at {where}", now))
         is_open = is_beat and way.is_same is not False and why != NO_KEY
@@ -259,7 +256,7 @@ class VehicleLinks:
 
     def _is_gone(self, place: Place) -> bool:
         """Return whether a link is down, or its peer has disconnected: it may be back anywhere."""
-        link = self._links.get(place[0])
+        link = self.links.get(place[0])
         return link is None or place[1] not in link.outlets
 
     def _forget_if_empty(self, place: Place) -> None:

@@ -104,12 +104,8 @@ class VehicleSide(VehicleLinks):
     def plan(self) -> None:
         """Set the timers of the changed vehicles."""
         for system_id, vehicle in self.touched.items():
-            timer = self._due.get(system_id)
-            if timer is None:
-                do = partial(self._handle_deadline, vehicle)
-                timer = self._timers.timer(Turn.VEHICLES, do, number=system_id)
-                self._due[system_id] = timer
-            timer.set(vehicle.next_deadline())
+            if timer := self._due.get(system_id):
+                timer.set(vehicle.next_deadline())
 
     def settle(self) -> list[Vehicle]:
         """Plan the changed vehicles, update what is kept of them, and return them."""
@@ -197,13 +193,12 @@ class VehicleSide(VehicleLinks):
     def _drop(self, system_id: int) -> bool:
         """Drop all control of a vehicle. Return whether it was driven."""
         vehicle = self._vehicles.pop(system_id, None)
-        self.touched.pop(system_id, None)
-        self._awaiting.pop(system_id, None)
-        if timer := self._due.pop(system_id, None):
-            self._timers.forget(timer)
-        self._note_last_words(system_id, ())
         if vehicle is None:
             return False
+        self.touched.pop(system_id, None)
+        self._awaiting.pop(system_id, None)
+        self._timers.forget(self._due.pop(system_id))
+        self._note_last_words(system_id, ())
         self._leave(vehicle)
         return vehicle.shut()
 
@@ -332,7 +327,7 @@ class VehicleSide(VehicleLinks):
 
     def check_late(self, *, now: float) -> None:
         """After a delay, and before anything else, stop the vehicles that drove on without us."""
-        timers = *self._due.values(), *(link.heartbeat for link in self._links.values())
+        timers = *self._due.values(), *(link.heartbeat for link in self.links.values())
         due = min((timer.at for timer in timers), default=inf)
         if due + self._settings.watch.late_tick >= now:
             return
@@ -415,6 +410,8 @@ class VehicleSide(VehicleLinks):
         if self.lease.is_shared:
             vehicle.parts.listens_until = now + LISTENS
         self._vehicles[number] = vehicle
+        do = partial(self._handle_deadline, vehicle)
+        self._due[number] = self._timers.timer(Turn.VEHICLES, do, number=number)
         self._budgets.clear()
         self.mark_dirty(vehicle)
         self._registry.record(VehicleSeen(number, f"found ({persona.name})", now))
