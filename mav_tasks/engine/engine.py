@@ -69,9 +69,7 @@ class Engine:
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         earlier = restored or Restored()
-        configured, (settings, why_not) = settings, with_all(settings, earlier.parameters)
-        #: why the latest settings override parameters that clients set
-        self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
+        configured, (settings, _) = settings, with_all(settings, earlier.parameters)
         self._settings = settings
         self._packets: list[Outgoing] = []
         self._intake = PacketReader()
@@ -167,6 +165,11 @@ class Engine:
         """Parameter values that clients have set, by name; they override the configuration."""
         return self._parameters.in_force
 
+    @property
+    def not_in_force(self) -> tuple[str, ...]:
+        """Why the settings override parameters that clients have set."""
+        return self._parameters.not_in_force
+
     def handle(self, item: Input, *, now: float) -> None:
         """Process one input."""
         self._begin(now=now)
@@ -218,7 +221,6 @@ class Engine:
                     self._questions.answered(now=now)
             case inputs.ParametersChanged(values=values):
                 self._parameters.share(dict(values))
-                self.not_in_force = self._parameters.not_in_force
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.NonceTaken():
@@ -226,7 +228,6 @@ class Engine:
                 self._any.nonce_taken(item, now=now)
             case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
-                self.not_in_force = self._parameters.not_in_force
             case inputs.WallClock(offset=offset):
                 self.signatures.set_wall(offset)
                 self._fleet.room.set_wall_offset(offset, now=now)
@@ -395,13 +396,6 @@ class Engine:
         )
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
-    def _stop_taken(self, vehicle: int, *, now: float) -> None:
-        """Obey the STOPs that came before this gateway got a vehicle, and that nobody obeyed."""
-        for received in self._elsewhere.stops_for(vehicle, now=now):
-            self._gcs.hear_out(received, now=now)
-            self._see_to(received, now=now)
-        self._elsewhere.obeyed(vehicle)
-
     def _forget(self, vehicle: int) -> None:
         """Forget a vehicle, which another gateway, or another vehicle, has the id of from now."""
         self._desks.forget(vehicle)
@@ -451,7 +445,10 @@ class Engine:
             self._passing.forward(client, packet, message, now=now)
 
     def _take_over(self, vehicles: Sequence[int], restored: Restored, *, now: float) -> None:
-        """Serve vehicles that this gateway has got, with their tasks and plans."""
+        """Serve vehicles that this gateway has got, with their tasks and plans.
+
+        Obey the STOPs that came before, and that nobody has obeyed.
+        """
         self._fleet.take_over(restored, now=now)
         self._deduplicator.restore(restored.tasks, now=now)
         self._assignments.watch(restored.tasks, now=now)
@@ -459,7 +456,10 @@ class Engine:
         self.signatures.take_lead(restored.signing_lead)
         self._vehicles.take(vehicles, now=now)
         for vehicle in vehicles:
-            self._stop_taken(vehicle, now=now)
+            for received in self._elsewhere.stops_for(vehicle, now=now):
+                self._gcs.hear_out(received, now=now)
+                self._see_to(received, now=now)
+            self._elsewhere.obeyed(vehicle)
 
     def _let_go(self, vehicles: Sequence[int], *, now: float) -> None:
         """Forget vehicles that another gateway hears, unless something came between."""
@@ -515,10 +515,8 @@ class Engine:
             self._journal += events
         if self._telling.at <= now:
             self._publisher.send_statuses(now=now)
-        if room.times.next_at != self._starting.at:
-            self._starting.set(room.times.next_at)
-        if signatures.keep_at != self._keeping.at:
-            self._keeping.set(signatures.keep_at)
+        self._starting.set(room.times.next_at)
+        self._keeping.set(signatures.keep_at)
 
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
