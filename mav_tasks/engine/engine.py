@@ -415,34 +415,34 @@ class Engine:
 
     def _see_to(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
-        if isinstance(message, m.CommandLong | m.CommandInt):
-            self._commands.receive(client, packet, command_of(message), now=now)
-        elif isinstance(message, (m.CommandCancel, m.SetMode)):
-            if (vehicle := self._vehicles.get(message.target_system)) is None:
-                return
-            if isinstance(message, m.CommandCancel):
-                source, command = packet.source, message.command
-                self._control.cancel_latest(client, vehicle, source, command, now=now)
-            else:
-                mode = int(message.custom_mode)
-                asked = MessageRequest.of(client, vehicle, packet, mode, now=now)
-                self._modes.heard(asked, now=now)
-        elif isinstance(message, m.RequestDataStream):
-            self._displays.set_streams(client, message)
-        elif isinstance(message, m.SetupSigning):
-            self._setup.receive(client, message, now=now)
-        elif isinstance(message, MissionMessage) and self._desks.receive(
-            client, packet, message, now=now
-        ):
-            return
-        else:
-            if isinstance(message, m.Heartbeat) and packet.system_id in self._vehicles.by_id:
-                return  # of a rover's component: back by another link, it would be on its side
-            if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
-                self._operator.receive(message, now=now)
-            elif isinstance(message, ParamMessage):
-                self._parameters.receive(client, packet, message, now=now)
-            self._passing.forward(client, packet, message, now=now)
+        match message:
+            case m.CommandLong() | m.CommandInt():
+                self._commands.receive(client, packet, command_of(message), now=now)
+            case m.CommandCancel():
+                if vehicle := self._vehicles.get(message.target_system):
+                    source, command = packet.source, message.command
+                    self._control.cancel_latest(client, vehicle, source, command, now=now)
+            case m.SetMode():
+                if vehicle := self._vehicles.get(message.target_system):
+                    mode = int(message.custom_mode)
+                    asked = MessageRequest.of(client, vehicle, packet, mode, now=now)
+                    self._modes.heard(asked, now=now)
+            case m.RequestDataStream():
+                self._displays.set_streams(client, message)
+            case m.SetupSigning():
+                self._setup.receive(client, message, now=now)
+            case m.Heartbeat() if packet.system_id in self._vehicles.by_id:
+                pass  # of a rover's component: back by another link, it would be on its side
+            case _:
+                if isinstance(message, MissionMessage) and self._desks.receive(
+                    client, packet, message, now=now
+                ):
+                    return
+                if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
+                    self._operator.receive(message, now=now)
+                elif isinstance(message, ParamMessage):
+                    self._parameters.receive(client, packet, message, now=now)
+                self._passing.forward(client, packet, message, now=now)
 
     def _take_over(self, vehicles: Sequence[int], restored: Restored, *, now: float) -> None:
         """Serve vehicles that this gateway has got, with their tasks and plans.

@@ -1,4 +1,4 @@
-"""Detects that a vehicle does not move as it was told to, and decides what to do about it.
+"""Detects that a vehicle does not move as it was told to, and makes it stand.
 
 It checks with each setpoint that a vehicle told to drive is not faster than asked, and that one
 told to stand does so. The same stop ladder serves everything that ends motion: STOP, cancel, pause,
@@ -21,12 +21,14 @@ reported, because a corrected position or a wrong velocity alone is no motion.
 """
 
 from collections import deque
-from enum import Enum, IntEnum, auto
+from enum import IntEnum
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.services.phase import Phase
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 
 NEARLY_STANDS = 0.1  # m/s; a vehicle that rolls on in HOLD from this speed rolls at most 5 cm
@@ -61,24 +63,12 @@ class Step(IntEnum):
     DISARM = 3
 
 
-class Measure(Enum):
-    """What the guard demands."""
+class Seen(NamedTuple):
+    """A finding that the control table decides about."""
 
-    #: HOLD: it is so slow that HOLD does not let it roll
-    HOLD_NOW = auto()
-    #: HOLD: setpoints do not stop it
-    HOLD = auto()
-    #: disarm: HOLD does not stop it either
-    DISARM = auto()
-    #: stop the task: it is faster than it was told to be
-    STOP_TASK = auto()
-
-
-class Found(NamedTuple):
-    """A measure, and the observation in words for the operator."""
-
-    measure: Measure
-    words: str = ""
+    event: Event
+    reason: TaskReason
+    words: str
 
 
 class MotionGuard:
@@ -130,63 +120,85 @@ class MotionGuard:
             return False
         return min(abs(moved[1]), abs(motion.forward)) > (ROLLS if rolls_out else MOVES)
 
-    def look(self, demand: Demand, seen: VehicleView, *, now: float) -> list[Found]:
-        """Return the measures that are due now, in order."""
-        control, asked = self._parts.control, demand.velocity
-        moved = self._displacement(now=now)
+    def look(self, demand: Demand, seen: VehicleView, *, is_deaf: bool, now: float) -> list[Seen]:
+        """Do what is due now, and return the findings that concern a task.
+
+        ``is_deaf``: somebody may have taken it over, which HOLD would undo.
+        """
+        parts, control, asked = self._parts, self._parts.control, demand.velocity
+        moved, active = self._displacement(now=now), parts.tasks.active
         speed = None if moved is None else moved[0]
         found = []
-        may_drive = control.in_control and not self._parts.tasks.is_stopped
-        if may_drive and (words := self._why_too_fast(asked.forward, speed, now=now)):
-            found.append(Found(Measure.STOP_TASK, words))
+        may_drive = control.in_control and not parts.tasks.is_stopped
+        words = self._why_too_fast(asked.forward, speed, now=now) if may_drive else ""
+        if words and active is not None and active.state is TaskState.EXECUTING:
+            found.append(Seen(Event.TOO_FAST, TaskReason.OVERSPEED, words))
         is_ours = control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING)
         if control.in_control and not asked.is_zero:
             self.told_to_move(now=now)
             self.step = Step.OFF
-        elif is_ours and self._parts.monitor.armed and not seen.still:
+        elif is_ours and parts.monitor.armed and not seen.still:
             self.begin(now=now)
-        if self.is_on and (measure := self._climb(demand, seen, speed, now=now)):
-            found.append(measure)
+        if self.is_on:
+            found += self._climb(demand, seen, speed, is_deaf=is_deaf, now=now)
         return found
 
     def _climb(
-        self, demand: Demand, seen: VehicleView, speed: float | None, *, now: float
-    ) -> Found | None:
-        """Go on to the next step if it is due, and return what follows."""
-        parts, persona = self._parts, self._parts.persona
+        self,
+        demand: Demand,
+        seen: VehicleView,
+        speed: float | None,
+        *,
+        is_deaf: bool,
+        now: float,
+    ) -> list[Seen]:
+        """Go on to the next step if it is due."""
+        parts, control, persona = self._parts, self._parts.control, self._parts.persona
         is_held = parts.monitor.custom_mode == persona.hold_mode
-        if seen.still or not seen.heard or not (parts.control.is_engaged or is_held):
+        if seen.still or not seen.heard or not (control.is_engaged or is_held):
             self.step = Step.OFF  # somebody else drives it
-            return None
-        is_stopping = parts.control.phase is Phase.STOPPING
+            return []
+        is_stopping = control.phase is Phase.STOPPING
         if speed is None and not is_stopping:
-            return None  # keep sending zeros, then HOLD: a car might roll on in HOLD
+            return []  # keep sending zeros, then HOLD: a car might roll on in HOLD
         self._note_speed(speed, now=now)
         if is_held:
             self._hold_seen_at = min(self._hold_seen_at, now)
         goes_on = demand.kind in GOES_ON
         patience, moves = (NO_EFFECT, MOVES) if is_stopping or not goes_on else (SWINGS, RUNS_ON)
         unslowed = now - self._slowed_at
-        if self.step is Step.SETPOINTS:
-            has_effect = speed is not None and (speed <= moves or unslowed < patience)
-            if now - self._began >= REACTION + patience and not has_effect:
-                self.step = Step.HOLD
-                return Found(Measure.HOLD)
-            if is_held:
-                self.step = Step.HOLD
-        if speed is None:
-            return None
+        wants_hold = (
+            self.step is Step.SETPOINTS
+            and now - self._began >= REACTION + patience
+            and (speed is None or (speed > moves and unslowed >= patience))
+        )
+        if wants_hold or (self.step is Step.SETPOINTS and is_held):
+            self.step = Step.HOLD
+        if wants_hold and goes_on:
+            words = "does not stop on zero setpoints: HOLD is set"
+            return [Seen(Event.NOT_STANDING, TaskReason.STOP_UNCONFIRMED, words)]
         if (
             self.step is Step.HOLD
+            and not wants_hold
             and now - self._hold_seen_at >= (parts.settings.watch.disarm_moving or inf)
             and unslowed >= ROLLS_OUT
+            and speed is not None
             and speed > MOVES
         ):
             self.step = Step.DISARM
-            words = f"still moves in HOLD ({speed:.1f} m/s): disarmed"
-            return Found(Measure.DISARM, words) if parts.monitor.armed else None
+            if parts.monitor.armed:
+                parts.note(f"still moves in HOLD ({speed:.1f} m/s): disarmed", now=now)
+                control.disarm_now(now=now)
+            return []
+        # it is so slow that HOLD does not let it roll
         ends = is_stopping or (persona.rolls_out and not goes_on)
-        return Found(Measure.HOLD_NOW) if ends and speed < NEARLY_STANDS else None
+        is_slow = ends and speed is not None and speed < NEARLY_STANDS
+        if control.in_control and (wants_hold or is_slow):
+            if not is_deaf:
+                control.begin_release(now=now)
+        elif is_slow or (wants_hold and is_stopping):
+            control.hold_now(now=now)
+        return []
 
     def _note_speed(self, speed: float | None, *, now: float) -> None:
         if speed is None:

@@ -5,10 +5,8 @@ It checks that the vehicle obeys. A finding about a task is an event for the con
 
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
 
-from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.motion_guard import GOES_ON, Found, Measure, MotionGuard
+from mav_tasks.engine.vehicles.motion_guard import MotionGuard, Seen
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
 from mav_tasks.services.offboard import REGAINED_UNSEEN
@@ -23,14 +21,6 @@ from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 UNSEEN_STOP = 3.0
 SHOWS_AGAIN = 1.5  # s after a gap, within which the next 1 Hz heartbeat comes
 BRAKES_FOR = 8.0  # s of set-points before the HOLD of a STOP, at most; the longest stop took 4 s
-
-
-class Seen(NamedTuple):
-    """A finding that the control table decides about."""
-
-    event: Event
-    reason: TaskReason
-    words: str
 
 
 class Pilot:
@@ -72,12 +62,7 @@ class Pilot:
                 parts.where.motion.doubt(until=now + UNSEEN_STOP)
                 seen = self._view(now)
         self._obey(demand, seen, now=now)
-        found = []
-        for each in self.guard.look(demand, seen, now=now):
-            event = self._take_measure(each, demand, now=now)
-            if event is not None:
-                found.append(event)
-        return found
+        return self.guard.look(demand, seen, is_deaf=self._is_deaf(now=now), now=now)
 
     def send(self, *, now: float) -> None:
         """Send what is queued in this tick, and plan the next tick."""
@@ -203,27 +188,6 @@ class Pilot:
                 self.begin_stop(brakes=True, now=now)
             case DemandKind.STOP | DemandKind.HALT:
                 control.stop(still=seen.still, heard=seen.heard, now=now)
-
-    def _take_measure(self, found: Found, demand: Demand, *, now: float) -> Seen | None:
-        """Climb the stop ladder. Return an event if a task is concerned, for the control table."""
-        control, active = self._parts.control, self._parts.tasks.active
-        match found.measure:
-            case Measure.STOP_TASK if active is not None and active.state is TaskState.EXECUTING:
-                return Seen(Event.TOO_FAST, TaskReason.OVERSPEED, found.words)
-            case Measure.HOLD if demand.kind in GOES_ON:
-                words = "does not stop on zero setpoints: HOLD is set"
-                return Seen(Event.NOT_STANDING, TaskReason.STOP_UNCONFIRMED, words)
-            case Measure.HOLD_NOW | Measure.HOLD if control.in_control:
-                if not self._is_deaf(now=now):
-                    control.begin_release(now=now)
-            case Measure.HOLD_NOW:
-                control.hold_now(now=now)
-            case Measure.HOLD if control.phase is Phase.STOPPING:
-                control.hold_now(now=now)
-            case Measure.DISARM:
-                self._parts.note(found.words, now=now)
-                control.disarm_now(now=now)
-        return None
 
     def _is_deaf(self, *, now: float) -> bool:
         """Return whether a task stands after a loss, and no heartbeat has come yet.

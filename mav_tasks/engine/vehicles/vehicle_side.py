@@ -425,22 +425,18 @@ class VehicleSide(VehicleLinks):
 
     def _persona_of(self, beat: Beat) -> Persona | None:
         """Return the persona of the autopilot that sends a heartbeat; None: it is not driven."""
-        _, packet, heartbeat, now = beat
-        if heartbeat.type in NOT_VEHICLES:
+        heartbeat, number = beat.message, beat.packet.system_id
+        # 0 addresses every vehicle, and our own id belongs to no vehicle
+        if heartbeat.type in NOT_VEHICLES or number in (0, self.our_address.system_id):
             return None
-        if packet.system_id in (0, self.our_address.system_id):
-            return None  # 0 addresses every vehicle, and our own id belongs to no vehicle
-        if heartbeat.type not in DRIVEN:  # other types give the mode numbers other meanings
+        if heartbeat.type in DRIVEN:
+            persona = persona_of(heartbeat, honours_yaw_rate=self._settings.yaw_rate == "honoured")
+            words = f"has autopilot type {heartbeat.autopilot}, which is not supported: not driven"
+        else:  # other types give the mode numbers other meanings
+            persona = None
             words = f"has vehicle type {heartbeat.type}, not that of a rover: not driven"
-            self.note_once(packet.system_id, words, now=now)
-            return None
-        persona = persona_of(heartbeat, honours_yaw_rate=self._settings.yaw_rate == "honoured")
         if persona is None:
-            self.note_once(
-                packet.system_id,
-                f"has autopilot type {heartbeat.autopilot}, which is not supported: not driven",
-                now=now,
-            )
+            self.note_once(number, words, now=beat.at)
         return persona
 
     def _note_intruder(
