@@ -76,7 +76,7 @@ class MotionGuard:
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
-        self._motion = parts.where.motion
+        self._motion = parts.where
         self.step = Step.OFF
         self._began = 0.0
         self._speeds: deque[tuple[float, float]] = deque()  # (s, m/s) of the last NO_EFFECT s

@@ -132,7 +132,7 @@ class Parts:
             return
         if self.is_driven_by_others(now=now):
             raise Rejection(TaskReason.OTHER_CONTROLLER, "the rover is under manual control")
-        if not self.where.motion.is_still(now=now):
+        if not self.where.is_still(now=now):
             raise Rejection(TaskReason.WRONG_MODE, "under manual control and moving: stop it first")
 
     def view(self, *, drives_on: bool, now: float) -> VehicleView:
@@ -153,8 +153,8 @@ class Parts:
             refusal=REFUSALS[control.refused],
             is_not_ready=control.is_not_ready,
             why_not_ready=self.failsafes.why_not_ready(now=now),
-            motion=where.motion.latest(),
-            still=where.motion.is_still(now=now),
+            motion=where.latest(),
+            still=where.is_still(now=now),
             other_controller=self.authority.since_other(now=now) < watch.other_controller,
             frame=where.frame(),
             home=where.home,

@@ -59,7 +59,7 @@ class Pilot:
             parts.authority.revoke()
             self._note_end(ended)
             if ended.reason is TaskReason.STUCK:
-                parts.where.motion.doubt(until=now + UNSEEN_STOP)
+                parts.where.doubt(until=now + UNSEEN_STOP)
                 seen = self._view(now)
         self._obey(demand, seen, now=now)
         return self.guard.look(demand, seen, is_deaf=self._is_deaf(now=now), now=now)
@@ -86,7 +86,7 @@ class Pilot:
         parts = self._parts
         self._face(now=now)
         is_better = parts.persona.brakes_by_setpoints or self._may_be_a_car(now=now)
-        is_seen = parts.where.motion.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
+        is_seen = parts.where.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
         brakes = brakes and is_better and is_seen
         longest = parts.settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
         parts.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
@@ -135,10 +135,9 @@ class Pilot:
 
         HOLD stops every vehicle, but some roll on in it.
         """
-        is_known = bool(self._parts.sticks.throttle(now=now)) and self._parts.where.motion.is_fresh(
-            now=now
-        )
-        return self._parts.persona.brakes_by_setpoints and is_known
+        parts = self._parts
+        is_known = bool(parts.sticks.throttle(now=now)) and parts.where.is_fresh(now=now)
+        return parts.persona.brakes_by_setpoints and is_known
 
     def _send_at_once(self, *, now: float) -> None:
         self.clock.restart(now=now)
@@ -153,7 +152,7 @@ class Pilot:
     def _face(self, *, now: float) -> None:
         """Tell the offboard control what decides how the vehicle is asked to stand."""
         parts = self._parts
-        motion = parts.where.motion.latest()
+        motion = parts.where.latest()
         is_known = motion is not None and now - motion.at <= parts.settings.watch.position_lost
         yaw = motion.pose.yaw if motion is not None and is_known else None
         persona = parts.persona
@@ -172,7 +171,7 @@ class Pilot:
             case DemandKind.DRIVE:
                 wanted = demand.velocity
                 if not wanted.is_zero:
-                    parts.where.motion.may_move()
+                    parts.where.may_move()
                 control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 is_deaf, disarm = self._is_deaf(now=now), self._is_back_home

@@ -252,7 +252,7 @@ class Vehicle:
             self._says.receive_parameter(message, now=now)
             self.joint.wake(now=now)
         elif isinstance(message, m.RcChannels):
-            sent_at = self.where.motion.clock.sent_at(message.time_boot_ms, now=now)
+            sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
             if self.parts.sticks.look(message, armed=self.armed, sent_at=sent_at):
                 self.joint.on(Event.STICK, Word(TaskReason.TAKEOVER, self.parts.actor), now=now)
         elif isinstance(message, m.AutopilotVersion):
@@ -372,7 +372,7 @@ class Vehicle:
         """Apply new settings, except those that need a restart (see the table of keys)."""
         self.parts.settings = settings
         self._monitor.lost_after = settings.watch.heartbeat_lost
-        self.where.motion.watch = settings.watch
+        self.where.watch = settings.watch
         self.requests.apply(settings.watch)
         self._says.apply(settings)
 

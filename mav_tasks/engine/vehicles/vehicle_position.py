@@ -6,16 +6,11 @@ is a place, and no autopilot promises that its frame begins there.
 """
 
 from collections.abc import Sequence
-from math import hypot
+from math import hypot, inf
 
 from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
-from mav_tasks.mavlink.messages import (
-    GlobalPositionInt,
-    GpsGlobalOrigin,
-    HomePosition,
-    LocalPositionNed,
-)
+from mav_tasks.mavlink.messages import Attitude, GlobalPositionInt, GpsGlobalOrigin, HomePosition
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.legs import distance
@@ -31,51 +26,43 @@ MAX_LATITUDE_DEGE7 = 900_000_000
 MAX_LONGITUDE_DEGE7 = 1_800_000_000
 
 
-class VehiclePosition:
+class VehiclePosition(MotionMonitor):
     """The position data of one vehicle, and what follows from it."""
 
     def __init__(self, watch: Watch, bounds: Bounds) -> None:
-        self.motion = MotionMonitor(watch)
+        super().__init__(watch)
         self._bounds = bounds
-        self._forget_frame()
 
     def __repr__(self) -> str:
-        return f"VehiclePosition({self.motion.latest()}, origin={self.origin})"
+        return f"VehiclePosition({self.latest()}, origin={self.origin})"
 
     def forget(self) -> None:
-        """Forget all position data after a restart of the vehicle."""
-        self.motion.forget()
-        self._forget_frame()
-
-    def _forget_frame(self) -> None:
+        """Forget all position data, but not the noise, after a restart of the vehicle."""
+        super().forget()
         #: the global position of the frame's origin, or None if it is unknown
         self.origin: GlobalPlace | None = None
         self._is_said = False
         self._booted: tuple[float, float] | None = None  # when, and when that was determined
         self._global: GlobalPositionInt | None = None
-        self._local: LocalPositionNed | None = None
         #: what HOME_POSITION says; None: nothing since the vehicle booted
         self.said_home: GlobalPlace | None = None
         #: the origin has changed; the reader resets this flag
         self.has_moved_frame = False
 
-    def receive(self, message: Stamped, *, now: float, not_after: float) -> Heard:
+    def receive(self, message: Stamped, *, now: float, not_after: float = inf) -> Heard:
         """Process a message and return its classification; an old message is dropped.
 
         A message that is read late counts as sent at ``not_after`` at the latest.
         """
-        motion = self.motion
         if isinstance(message, GlobalPositionInt):
-            heard = motion.clock.hear(message, now=now)
+            heard = self.clock.hear(message, now=now)
         else:
-            heard = motion.receive(message, now=now, not_after=not_after)
+            heard = super().receive(message, now=now, not_after=not_after)
         if heard is Heard.NEWS:
-            self._booted = motion.clock.booted_at(now=now), now
+            self._booted = self.clock.booted_at(now=now), now
             if isinstance(message, GlobalPositionInt):
                 self._global = message
-                self._work_out()
-            elif isinstance(message, LocalPositionNed):
-                self._local = message
+            if not isinstance(message, Attitude):
                 self._work_out()
         return heard
 
@@ -98,7 +85,7 @@ class VehiclePosition:
     @property
     def home(self) -> GlobalPlace | None:
         """The place to which the vehicle returns: the nearest rally point, else its home."""
-        motion = self.motion.latest()
+        motion = self.latest()
         rally = None if motion is None else self._bounds.refuge(motion.pose, self.origin)
         return rally or self.said_home
 
@@ -109,7 +96,7 @@ class VehiclePosition:
 
     def distance_to(self, goal: GoTo) -> float | None:
         """Return the metres to the place of a goal, or None if that is unknown."""
-        motion, place = self.motion.latest(), self._place_of(goal)
+        motion, place = self.latest(), self._place_of(goal)
         return None if motion is None or place is None else distance(motion.pose, place)
 
     def is_within_fence(self, goal: GoTo) -> bool:
@@ -125,7 +112,7 @@ class VehiclePosition:
         return local_place(self.home if goal.place is None else goal.place, self.origin)
 
     def _work_out(self) -> None:
-        where, local = self._global, self._local
+        where, local = self._global, self._position
         if self._is_said or where is None or local is None:
             return
         later = (where.time_boot_ms - local.time_boot_ms) / 1000

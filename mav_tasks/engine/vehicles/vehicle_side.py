@@ -303,7 +303,7 @@ class VehicleSide(VehicleLinks):
                 return None
             self._answer = answer or self._answer
             if told is not None:
-                clock = vehicle.where.motion.clock
+                clock = vehicle.where.clock
                 clock.exchange(told.ts1 / NANO, told.tc1 / NANO, now=now)
             if from_autopilot and vehicle.shows_another(message, now=now):
                 latest = vehicle.parts.monitor.latest
