@@ -232,7 +232,10 @@ class Engine:
                 self.signatures.set_wall(offset)
                 self._fleet.room.set_wall_offset(offset, now=now)
             case inputs.Shutdown():
-                self._shut_down(now=now)
+                self._submissions.close()
+                self._stop_by = now + self._settings.watch.shutdown
+                self._stopping.set(self._stop_by)
+                self._vehicles.shut_down(now=now)
             case _:
                 assert_never(item)
         self._settle(now=now)
@@ -528,12 +531,6 @@ class Engine:
             self._operator.apply,
         ):
             apply(settings)
-
-    def _shut_down(self, *, now: float) -> None:
-        self._submissions.close()
-        self._stop_by = now + self._settings.watch.shutdown
-        self._stopping.set(self._stop_by)
-        self._vehicles.shut_down(now=now)
 
     def _note_stopped(self, *, now: float) -> None:
         rolling = tuple(v.system_id for v in self._vehicles.all if v.control.is_engaged)

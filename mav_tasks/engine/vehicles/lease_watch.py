@@ -22,14 +22,15 @@ class LeaseWatch(Fence):
 
     def __init__(self, timers: Timers, *, is_shared: bool) -> None:
         """``is_shared``: the vehicles are a fleet's, so that nothing is permitted yet."""
-        super().__init__(is_shared, -inf if is_shared else inf, -inf if is_shared else inf)
+        until = -inf if is_shared else inf
+        super().__init__(is_shared, until, until)
         self._timer = timers.timer(Turn.LINKS, self._look)
         #: whether vehicles may be moved
         self.is_trusted = not is_shared
         self._is_leaving = False
         self._back_at = -inf  # s, when it was trusted again
         #: until when packets that stop vehicles may leave, s
-        self.stop_until = self.until
+        self.stop_until = until
 
     def __repr__(self) -> str:
         return f"LeaseWatch({'trusted' if self.is_trusted else 'ended'}, {self.until})"
