@@ -8,7 +8,7 @@ A vehicle answers an observer's requests over its own link. A list of all parame
 small requests a second, would delay the telemetry that a task is driven by.
 """
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.latest import keep_latest
@@ -85,28 +85,25 @@ class LinkBudget:
 def granted(commanding: Intervals, observing: Intervals, *, spare: float) -> Intervals:
     """Return what a vehicle is asked for beyond the server's own needs."""
     own = {number: 1 / interval for number, interval in WANTED.items()}
-    rates = own.copy()
-    _raise(rates, commanding, shortest=SHORTEST, most=(1 - OBSERVERS_SHARE) * spare)
-    _raise(rates, observing, shortest=OBSERVERS_SHORTEST, most=OBSERVERS_SHARE * spare)
+    rates = dict(own)
+    for wishes, shortest, share in (
+        (commanding, SHORTEST, 1 - OBSERVERS_SHARE),
+        (observing, OBSERVERS_SHORTEST, OBSERVERS_SHARE),
+    ):
+        extra = {
+            number: 1 / max(interval, shortest) - rates.get(number, 0.0)
+            for number, interval in wishes.items()
+        }
+        extra = {number: rate for number, rate in extra.items() if rate > 0}
+        cost = sum(rate * size_of(number) for number, rate in extra.items())
+        part = min(1.0, share * spare / cost) if cost else 0.0
+        for number, rate in extra.items():
+            raised = rates.get(number, 0.0) + part * rate
+            if raised >= 1 / SLOWEST or number in rates:
+                rates[number] = raised
     return {
         number: round(1 / rate, 3) for number, rate in rates.items() if rate > own.get(number, 0.0)
     }
-
-
-def _raise(
-    rates: dict[int, float], wishes: Mapping[int, float], *, shortest: float, most: float
-) -> None:
-    extra = {
-        number: 1 / max(interval, shortest) - rates.get(number, 0.0)
-        for number, interval in wishes.items()
-    }
-    extra = {number: rate for number, rate in extra.items() if rate > 0}
-    cost = sum(rate * size_of(number) for number, rate in extra.items())
-    part = min(1.0, most / cost) if cost else 0.0
-    for number, rate in extra.items():
-        raised = rates.get(number, 0.0) + part * rate
-        if raised >= 1 / SLOWEST or number in rates:
-            rates[number] = raised
 
 
 def _size_of_answer(message: m.Message) -> int:
