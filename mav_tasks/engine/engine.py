@@ -7,19 +7,23 @@ never goes back.
 
 from collections.abc import Sequence
 from math import inf
+from operator import attrgetter
 from typing import assert_never
 
 from mav_tasks.engine import inputs
-from mav_tasks.engine.clients.broadcasts import Broadcasts
+from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.elsewhere import Elsewhere
-from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
-from mav_tasks.engine.clients.parameters import ParameterServer
+from mav_tasks.engine.clients.parameters import ParameterServer, ParamMessage
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
+from mav_tasks.engine.clients.restart_watch import RestartWatch
+from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.commands.any_rover import AnyRover
 from mav_tasks.engine.commands.assignments import Assignments
+from mav_tasks.engine.commands.command_request import MessageRequest
 from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
@@ -27,18 +31,22 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
+from mav_tasks.engine.commands.words import kind_of_message
 from mav_tasks.engine.figures import Figures
-from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Peer
+from mav_tasks.engine.inputs import FLEET_LINK, Input, LinkSide, Outgoing, Packets, Peer
 from mav_tasks.engine.missions.mission_reports import MissionReports
-from mav_tasks.engine.missions.mission_server import MissionServers
+from mav_tasks.engine.missions.mission_server import MissionMessage, MissionServers
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.missions.transfer import MissionParts
 from mav_tasks.engine.packet_reader import PacketReader
-from mav_tasks.engine.reception import Reception
+from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.snapshot import Reach, Snapshot, VehicleSnapshot
 from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
+from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import SubmissionDeduplicator
@@ -53,9 +61,7 @@ class Engine:
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         earlier = restored or Restored()
-        configured, (settings, why_not) = settings, with_all(settings, earlier.parameters)
-        #: why the latest settings override parameters that clients set
-        self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
+        configured, (settings, _) = settings, with_all(settings, earlier.parameters)
         self._settings = settings
         self._packets: list[Outgoing] = []
         self._intake = PacketReader()
@@ -85,14 +91,14 @@ class Engine:
             settings=settings,
         )
         vehicles = self._vehicles = VehicleSide(
-            queue=self._packets,
-            packer=packer,
-            signatures=self.signatures,
-            registry=registry,
-            fleet=self._fleet,
-            timers=timers,
-            settings=settings,
-            is_shared=bool(earlier.gateway),
+            self._packets,
+            packer,
+            self.signatures,
+            registry,
+            self._fleet,
+            timers,
+            settings,
+            LeaseWatch(timers, is_shared=bool(earlier.gateway)),
         )
         deduplicator = self._deduplicator = SubmissionDeduplicator(registry)
         deduplicator.restore(earlier.tasks, now=now)
@@ -105,9 +111,10 @@ class Engine:
         )
         plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
         displays = MessageRequests(gcs, vehicles, self.signatures, registry, earlier.gateway)
+        self._displays = displays
         refusals = self._refusals = Refusals(registry, vehicles)
         modes = self._modes = ModeRequests(gcs, submissions, plans, refusals)
-        control = TaskControl(registry)
+        control = self._control = TaskControl(registry)
         assignments = self._assignments = Assignments(
             vehicles, self._fleet, registry, timers, settings, is_open=lambda: submissions.is_open
         )
@@ -125,26 +132,12 @@ class Engine:
             gcs, vehicles, registry, displays, submissions, timers, settings, now=now
         )
         self._passing = Forwarder(vehicles, refusals)
-        self._reception = Reception(
-            gcs=gcs,
-            vehicles=vehicles,
-            intake=self._intake,
-            refusals=refusals,
-            elsewhere=self._elsewhere,
-            broadcasts=Broadcasts(vehicles, packer),
-            commands=Commands(vehicles, submissions, plans, modes, control, displays, self._any),
-            control=control,
-            modes=modes,
-            displays=displays,
-            desks=self._desks,
-            parameters=self._parameters,
-            passing=self._passing,
-            publisher=self._publisher,
-            reports=self._reports,
-        )
+        self._broadcasts = Broadcasts(vehicles, packer)
+        self._commands = Commands(vehicles, submissions, plans, modes, control, displays, self._any)
+        self._restarts = RestartWatch()
         #: figures for metrics
         self.figures = Figures(vehicles, gcs, self._fleet, registry)
-        self._stop_by: float | None = None
+        self._stop_by = inf  # by then, vehicles have stopped, or the server ends without
         self._stopped = False
         #: zero and HOLD for every driven vehicle, as of the last ``take_packets``; the runner sends
         #: them if the engine raises
@@ -158,26 +151,29 @@ class Engine:
         """Parameter values that clients have set, by name; they override the configuration."""
         return self._parameters.in_force
 
+    @property
+    def not_in_force(self) -> tuple[str, ...]:
+        """Why the settings override parameters that clients have set."""
+        return self._parameters.not_in_force
+
     def handle(self, item: Input, *, now: float) -> None:
         """Process one input."""
-        self.signatures.now = now
-        if self._timers.not_before + self._settings.watch.late_tick < now:
-            self._vehicles.check_late(now=now)
+        self._begin(now=now)
         match item:
             case inputs.Packets():
-                self._reception.receive((item,), now=now)
+                self._receive((item,), now=now)
             case inputs.Committed(through=through):
                 self._submissions.committed(through, now=now)
                 self._vehicles.commit(now=now)
             case inputs.HaltsKept(through=through):
                 self._submissions.gate.halts_kept(through, now=now)
             case inputs.AtOnce(packets=several):
-                self._reception.receive(several, now=now)
+                self._receive(several, now=now)
             case inputs.LinkChanged(side=side):
                 self._intake.change_link(item)
                 self.signatures.change_link(item)
                 clients = side is LinkSide.CLIENTS
-                (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
+                (self._gcs if clients else self._vehicles).change_link(item, now=now)
             case inputs.KeysChanged():
                 gone = self.signatures.change_keys(item)
                 self._questions.keys_revoked(now=now)
@@ -187,7 +183,7 @@ class Engine:
             case inputs.PeerChanged():
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
-                self._vehicles.links.change_peer(item)
+                self._vehicles.change_peer(item)
                 if item.link in self._gcs.links:
                     self._passing.end(item.link, item.peer, now=now)
             case inputs.Congestion():
@@ -210,7 +206,6 @@ class Engine:
                     self._questions.answered(now=now)
             case inputs.ParametersChanged(values=values):
                 self._parameters.share(dict(values))
-                self.not_in_force = self._parameters.not_in_force
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.NonceTaken():
@@ -218,28 +213,28 @@ class Engine:
                 self._any.nonce_taken(item, now=now)
             case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
-                self.not_in_force = self._parameters.not_in_force
             case inputs.WallClock(offset=offset):
                 self.signatures.set_wall(offset)
                 self._fleet.room.set_wall_offset(offset, now=now)
             case inputs.Shutdown():
-                self._shut_down(now=now)
+                self._submissions.close()
+                self._stop_by = now + self._settings.watch.shutdown
+                self._stopping.set(self._stop_by)
+                self._vehicles.shut_down(now=now)
             case _:
                 assert_never(item)
         self._settle(now=now)
 
     def next_deadline(self) -> float | None:
         """Return when ``handle_deadline`` must be called next, or None if no timer is set."""
-        if self._vehicles.deadline_heap.touched:  # by ``_settle``, after it settled them
-            self._vehicles.deadline_heap.plan()
+        if self._vehicles.touched:  # by ``_settle``, after it settled them
+            self._vehicles.plan()
         due = self._timers.next_deadline()
         return None if due == inf else due
 
     def handle_deadline(self, *, now: float) -> None:
         """Do everything due by ``now``; the call may be late, or needless."""
-        self.signatures.now = now
-        if self._timers.not_before + self._settings.watch.late_tick < now:
-            self._vehicles.check_late(now=now)
+        self._begin(now=now)
         due = self._timers.take_due(now=now)
         for timer in due:
             if timer.turn < Turn.SETTLING:
@@ -259,7 +254,7 @@ class Engine:
 
     def take_packets(self) -> list[Outgoing]:
         """Return the datagrams to send, in order."""
-        self.emergency_stop_packets = self._vehicles.deadline_heap.emergency_stop_packets
+        self.emergency_stop_packets = self._vehicles.emergency_stop_packets
         packets = self._packets.copy()
         self._packets.clear()  # clear in place: every PacketSender shares this list
         return packets
@@ -293,7 +288,7 @@ class Engine:
         """Return whether a client or a rover at an endpoint has sent a valid packet."""
         if client := self._gcs.client((link, peer)):
             return client.is_heard
-        return self._vehicles.links.has_vehicle_at(link, peer)
+        return self._vehicles.has_vehicle_at(link, peer)
 
     def reach(self, *, now: float) -> Reach:
         """Return which vehicles are heard, also those that another gateway has, and are ours."""
@@ -314,8 +309,136 @@ class Engine:
         """Until when ``emergency_stop_packets`` may leave, s."""
         return self._vehicles.lease.stop_until
 
+    def _begin(self, *, now: float) -> None:
+        """Note the time; after a delay, and before anything else, stop what drove on without us."""
+        self.signatures.now = now
+        if self._timers.not_before + self._settings.watch.late_tick < now:
+            self._vehicles.check_late(now=now)
+
+    def _receive(self, items: Sequence[Packets], *, now: float) -> None:
+        """Handle packets in the order of their arrival; those that halt a rover come first."""
+        received: list[Received] = []
+        others: list[Packets] = []
+        for item in items:
+            if item.link in self._gcs.links:
+                if item.link == FLEET_LINK:
+                    item = self._elsewhere.bring_back(item)
+                received += self._received(item, now=now)
+            else:
+                others.append(item)
+        if len(items) > 1:
+            received.sort(key=attrgetter("arrived"))
+        if len(received) > 1:
+            for each in self._halts_first(received):
+                self._gcs.hear_out(each, now=now)
+                self._receive_from_client(each, now=now)
+        elif received:
+            self._receive_from_client(received[0], now=now)
+        for item in others:
+            if item.link in self._vehicles.links:
+                self._receive_from_vehicles(item, now=now)
+
+    def _received(self, item: Packets, *, now: float) -> list[Received]:
+        taken = self._intake.packets(self._gcs.let_in(item, now=now), self._gcs.counts, now=now)
+        received: list[Received] = []
+        for peer, packet, arrived in taken:
+            if each := self._gcs.receive(item.link, peer, packet, arrived=arrived, now=now):
+                received.append(each)
+        return received
+
+    def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
+        for peer, packet, _ in self._intake.packets(item, self._vehicles.counts, now=now):
+            vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
+            while self._vehicles.gone:
+                self._forget(self._vehicles.gone.pop())
+            if vehicle is not None:
+                if self._restarts.begins_anew(packet, now=now):
+                    self._gcs.continue_numbers(packet)
+                if (
+                    self._vehicles.is_answer_to_us(packet)
+                    or packet.message_id == m.CommandAck.id
+                    or self._reports.replaces(packet)
+                ):
+                    self._publisher.withhold(packet)
+                else:
+                    is_stopped = vehicle.tasks.is_stopped
+                    shown = vehicle.shown.applied(packet, is_stopped=is_stopped, now=now)
+                    self._gcs.forward(shown, now=now)
+
+    def _halts_first(self, received: list[Received]) -> list[Received]:
+        """Move packets that start or drive a rover behind those that halt one.
+
+        The order is otherwise kept.
+        """
+        kinds = [self._kind_of(each.message) for each in received]
+        if Kind.HALT not in kinds:
+            return received
+        goes = [kind in (Kind.GO, Kind.MOTION) for kind in kinds]
+        return [received[number] for number in sorted(range(len(goes)), key=goes.__getitem__)]
+
+    def _kind_of(self, message: m.Message | None) -> Kind:
+        target = getattr(message, "target_system", 0)
+        is_of_all = target in (EVERYBODY, self._vehicles.our_address.system_id)
+        vehicle = (
+            next(iter(self._vehicles.all), None) if is_of_all else self._vehicles.look_at(target)
+        )
+        return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
+
+    def _forget(self, vehicle: int) -> None:
+        """Forget a vehicle, which another gateway, or another vehicle, has the id of from now."""
+        self._desks.forget(vehicle)
+        self._reports.forget(vehicle)
+        self._restarts.forget(vehicle)
+
+    def _receive_from_client(self, received: Received, *, now: float) -> None:
+        if not self._refusals.may_pass(received, now=now):
+            return
+        if self._elsewhere.takes(received, now=now):
+            return
+        if len(received.client.introduced) < len(self._vehicles.by_id):
+            self._publisher.welcome(received.client, now=now)
+        if getattr(received.message, "target_system", None) == EVERYBODY:
+            for each in self._broadcasts.addressed(received):
+                self._see_to(each, now=now)
+        else:
+            self._see_to(received, now=now)
+
+    def _see_to(self, received: Received, *, now: float) -> None:
+        client, packet, message = received.client, received.packet, received.message
+        match message:
+            case m.CommandLong() | m.CommandInt():
+                self._commands.receive(client, packet, command_of(message), now=now)
+            case m.CommandCancel():
+                if vehicle := self._vehicles.get(message.target_system):
+                    source, command = packet.source, message.command
+                    self._control.cancel_latest(client, vehicle, source, command, now=now)
+            case m.SetMode():
+                if vehicle := self._vehicles.get(message.target_system):
+                    mode = int(message.custom_mode)
+                    asked = MessageRequest.of(client, vehicle, packet, mode, now=now)
+                    self._modes.heard(asked, now=now)
+            case m.RequestDataStream():
+                self._displays.set_streams(client, message)
+            case m.SetupSigning():
+                self._displays.set_up_signing(client, message, now=now)
+            case m.Heartbeat() if packet.system_id in self._vehicles.by_id:
+                pass  # of a rover's component: back by another link, it would be on its side
+            case _:
+                if isinstance(message, MissionMessage) and self._desks.receive(
+                    client, packet, message, now=now
+                ):
+                    return
+                if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
+                    self._publisher.hear_operator(message, now=now)
+                elif isinstance(message, ParamMessage):
+                    self._parameters.receive(client, packet, message, now=now)
+                self._passing.forward(client, packet, message, now=now)
+
     def _take_over(self, vehicles: Sequence[int], restored: Restored, *, now: float) -> None:
-        """Serve vehicles that this gateway has got, with their tasks and plans."""
+        """Serve vehicles that this gateway has got, with their tasks and plans.
+
+        Obey the STOPs that came before, and that nobody has obeyed.
+        """
         self._fleet.take_over(restored, now=now)
         self._deduplicator.restore(restored.tasks, now=now)
         self._assignments.watch(restored.tasks, now=now)
@@ -323,7 +446,10 @@ class Engine:
         self.signatures.take_lead(restored.signing_lead)
         self._vehicles.take(vehicles, now=now)
         for vehicle in vehicles:
-            self._reception.stop_taken(vehicle, now=now)
+            for received in self._elsewhere.stops_for(vehicle, now=now):
+                self._gcs.hear_out(received, now=now)
+                self._see_to(received, now=now)
+            self._elsewhere.obeyed(vehicle)
 
     def _let_go(self, vehicles: Sequence[int], *, now: float) -> None:
         """Forget vehicles that another gateway hears, unless something came between."""
@@ -333,7 +459,7 @@ class Engine:
             self._deduplicator.forget_vehicle(vehicle, tasks)
             self._assignments.forget(vehicle, tasks)
             self._plans.forget(vehicle)
-            self._reception.forget(vehicle)
+            self._forget(vehicle)
             self._gcs.forget_vehicle(vehicle, tasks)
 
     def _tell_statuses(self, *, now: float) -> None:
@@ -347,14 +473,12 @@ class Engine:
         for system_id in room.take_woken() if room.woken else ():
             if woken := self._vehicles.get(system_id):
                 woken.joint.wake(now=now)
-        for vehicle in (
-            self._vehicles.deadline_heap.settle() if self._vehicles.deadline_heap.touched else ()
-        ):
+        for vehicle in self._vehicles.settle() if self._vehicles.touched else ():
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
                 deliver(self._gcs, self._submissions, vehicle, answered, now=now)
             self._reports.tell_unperformed(vehicle, now=now)
-        if self._stop_by is not None:
+        if self._stop_by < inf:
             self._note_stopped(now=now)
         while signatures.refused:
             self._registry.record(signatures.refused.pop(0))
@@ -375,32 +499,20 @@ class Engine:
             self._journal += events
         if self._telling.at <= now:
             self._publisher.send_statuses(now=now)
-        if room.times.next_at != self._starting.at:
-            self._starting.set(room.times.next_at)
-        if signatures.keep_at != self._keeping.at:
-            self._keeping.set(signatures.keep_at)
+        self._starting.set(room.times.next_at)
+        self._keeping.set(signatures.keep_at)
 
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
         self.signatures.apply(settings.signing.window)
-        self._fleet.apply(settings)
-        self._gcs.apply(settings)
-        self._vehicles.apply(settings)
-        self._submissions.apply(settings)
-        self._assignments.apply(settings)
-        self._any.apply(settings)
-        self._desks.apply(settings)
-        self._reports.apply(settings)
-        self._publisher.apply(settings)
-
-    def _shut_down(self, *, now: float) -> None:
-        self._submissions.close()
-        self._stop_by = now + self._settings.watch.shutdown
-        self._stopping.set(self._stop_by)
-        self._vehicles.shut_down(now=now)
+        for apply in (
+            *(self._fleet.apply, self._gcs.apply, self._vehicles.apply, self._submissions.apply),
+            *(self._assignments.apply, self._any.apply, self._desks.apply, self._reports.apply),
+            self._publisher.apply,
+        ):
+            apply(settings)
 
     def _note_stopped(self, *, now: float) -> None:
-        assert self._stop_by is not None
         rolling = tuple(v.system_id for v in self._vehicles.all if v.control.is_engaged)
         if not self._stopped and (not rolling or now >= self._stop_by):
             self._stopped = True

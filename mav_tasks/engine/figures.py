@@ -80,7 +80,7 @@ class Figures:
         tasks, vehicle = self._fleet.get(system_id), self._vehicles.look_at(system_id)
         if tasks is None:
             return None
-        motion = None if vehicle is None else vehicle.where.motion.latest()
+        motion = None if vehicle is None else vehicle.where.latest()
         return VehicleFigures(
             vehicle=system_id,
             heartbeat_age=inf if vehicle is None else max(0.0, now - vehicle.heard_at),
@@ -99,4 +99,4 @@ class Figures:
     def is_still(self, system_id: int, *, now: float) -> bool:
         """Return whether fresh data shows that a vehicle stands."""
         vehicle = self._vehicles.look_at(system_id)
-        return vehicle is not None and vehicle.where.motion.is_still(now=now)
+        return vehicle is not None and vehicle.where.is_still(now=now)

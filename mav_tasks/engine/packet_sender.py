@@ -1,6 +1,7 @@
 """Output to one endpoint: sequence numbers per source, packing, and the shared packet queue."""
 
 from collections import deque
+from dataclasses import dataclass, field
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
@@ -12,6 +13,7 @@ from mav_tasks.mavlink.packet import Packet, with_seq
 from mav_tasks.mavlink.sequence import SequenceKeeper
 
 
+@dataclass
 class Fence:
     """Until when packets may leave, s: a gateway of a fleet has its vehicles for a term only.
 
@@ -19,45 +21,25 @@ class Fence:
     ``is_shared``: the vehicles are a fleet's.
     """
 
-    __slots__ = ("is_shared", "relays_until", "until")
-
-    def __init__(self, *, is_shared: bool = False) -> None:
-        self.is_shared = is_shared
-        self.until = self.relays_until = inf
-
-    @classmethod
-    def shut(cls) -> "Fence":
-        """Return a fence that no packet passes."""
-        it = cls(is_shared=True)
-        it.until = it.relays_until = -inf
-        return it
+    is_shared: bool = False
+    until: float = inf
+    relays_until: float = inf
 
 
+@dataclass(slots=True, repr=False, eq=False)
 class PacketSender:
     """Sends to one endpoint of one link, and signs if the endpoint expects it."""
 
-    def __init__(
-        self,
-        link: str,
-        peer: Peer,
-        queue: list[Outgoing],
-        packer: Packer,
-        signatures: Signatures | None = None,
-        fence: Fence | None = None,
-        sent: deque[Outgoing] | None = None,
-    ) -> None:
-        """``fence``: of all packets but those that are sent ``unfenced``.
-
-        ``sent`` takes each packet, too.
-        """
-        self.link = link
-        self.peer = peer
-        self._queue = queue
-        self._packer = packer
-        self._signatures = signatures
-        self._fence = fence or Fence()
-        self._sequence = SequenceKeeper()
-        self._sent = sent
+    link: str
+    peer: Peer
+    _queue: list[Outgoing]
+    _packer: Packer
+    _signatures: Signatures | None = None
+    #: of all packets but those that are sent unfenced
+    _fence: Fence = field(default_factory=Fence)
+    #: takes each packet, too
+    _sent: deque[Outgoing] | None = None
+    _sequence: SequenceKeeper = field(default_factory=SequenceKeeper)
 
     def __repr__(self) -> str:
         return f"PacketSender({self.link}, {self.peer})"
@@ -68,7 +50,8 @@ class PacketSender:
 
     def shut(self) -> "PacketSender":
         """Return a sender to the same endpoint whose packets never leave."""
-        return PacketSender(self.link, self.peer, self._queue, self._packer, None, Fence.shut())
+        fence = Fence(is_shared=True, until=-inf, relays_until=-inf)
+        return PacketSender(self.link, self.peer, self._queue, self._packer, None, fence)
 
     def forget(self, system_id: int) -> None:
         """Forget the numbers of a system, which another gateway sends from here on."""

@@ -4,6 +4,7 @@ A part sets its timer when its need changes; no part is polled. Most packets onl
 A postponed timer keeps its early heap entry, which is replaced when it reaches the top.
 """
 
+from dataclasses import dataclass
 from enum import IntEnum, auto
 from heapq import heapify, heappop, heappush
 from itertools import count
@@ -40,24 +41,20 @@ _Entry = tuple[float, Turn, int, "Timer"]
 _of_turn = attrgetter("turn")
 
 
+@dataclass(slots=True, repr=False, eq=False)
 class Timer:
     """The next call of one part; made by ``Timers``."""
 
-    __slots__ = ("_timers", "at", "do", "entered", "number", "period", "turn")
-
-    def __init__(
-        self, timers: "Timers", turn: Turn, number: int, do: Effect, period: float
-    ) -> None:
-        self._timers = timers
-        self.turn = turn
-        self.number = number
-        self.do = do
-        #: s from one call to the next, or inf if it does not repeat
-        self.period = period
-        #: when it is due, or inf if it is not set
-        self.at = inf
-        #: the time of its valid heap entry; its other entries are outdated
-        self.entered = inf
+    _timers: "Timers"
+    turn: Turn
+    number: int
+    do: Effect
+    #: s from one call to the next, or inf if it does not repeat
+    period: float = inf
+    #: when it is due, or inf if it is not set
+    at: float = inf
+    #: the time of its valid heap entry; its other entries are outdated
+    entered: float = inf
 
     def __repr__(self) -> str:
         return f"Timer({self.turn.name} {self.number}, at {self.at})"
@@ -93,17 +90,17 @@ class Timers:
     def timer(self, turn: Turn, do: Effect, *, number: int | None = None) -> Timer:
         """Return a timer that is not set; timers due in the same turn run by ``number``."""
         number = next(self._numbers) if number is None else number
-        return Timer(self, turn, number, do, inf)
+        return Timer(self, turn, number, do)
 
     def forget(self, timer: Timer) -> None:
         """Cancel a timer for good, so that nothing refers to its part any more."""
         timer.at = timer.entered = inf
-        self.heap[:] = [entry for entry in self.heap if entry[3] is not timer]
-        heapify(self.heap)
+        self._forget_outdated()
 
     def rhythm(self, turn: Turn, do: Effect, *, period: float, now: float) -> Timer:
         """Return a timer that is due now and each ``period``; missed calls are not made up for."""
-        timer = Timer(self, turn, next(self._numbers), do, period)
+        timer = self.timer(turn, do)
+        timer.period = period
         timer.set(now)
         return timer
 

@@ -11,7 +11,7 @@ from mav_tasks.probe.steps import Steps, Wait, pause
 from mav_tasks.services.identity import identity_of
 from mav_tasks.services.interval_requester import WANTED
 from mav_tasks.services.persona import persona_of
-from mav_tasks.services.prearm_check import passes_checks
+from mav_tasks.services.sys_status import passes_checks
 
 LISTEN = 3.0  # s, in which what comes by itself is counted
 ASK_AGAIN = 0.5  # s

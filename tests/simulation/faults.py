@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 COMMANDS, VEHICLES = "engine/commands", "engine/vehicles"
 #: name: file, line, what takes its place
 FAULTS: dict[str, tuple[str, str, str]] = {
-    "C1 order by reading": ("engine/reception.py", "arrived=arrived", "arrived=now"),
+    "C1 order by reading": ("engine/engine.py", "arrived=arrived", "arrived=now"),
     "C4 moved times are kept": (
         "tasks/times.py",
         "if len(self._heap) > 2",

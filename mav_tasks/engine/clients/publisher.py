@@ -218,5 +218,5 @@ class Publisher:
                     if wish.commands is not None and wish.interval is not None:
                         intervals = least[wish.commands]
                         intervals[number] = min(wish.interval, intervals.get(number, inf))
-            spare = self._vehicles.links.link_budget(vehicle, now=now).spare
+            spare = self._vehicles.link_budget(vehicle, now=now).spare
             vehicle.requests.intervals.set_wishes(granted(least[True], least[False], spare=spare))

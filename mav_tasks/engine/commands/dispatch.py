@@ -226,7 +226,7 @@ class Commands:
         """Raise Rejection if an observer's question is too much for the rover's link."""
         if asked.row.kind is Kind.QUESTION and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
-            why_not = self._vehicles.links.why_not_asked(
+            why_not = self._vehicles.why_not_asked(
                 asked.vehicle, asked.client.key, asked.packet, message, now=now
             )
             if why_not is not None:

@@ -59,9 +59,7 @@ class Forwarder:
         for vehicles in behind.values():
             refusing = [v for v in vehicles if not may_pass(v, client, row, message)]
             too_much = (
-                self._vehicles.links.why_not_asked(
-                    vehicles[0], client.key, packet, message, now=now
-                )
+                self._vehicles.why_not_asked(vehicles[0], client.key, packet, message, now=now)
                 if is_observers and message is not None
                 else None
             )

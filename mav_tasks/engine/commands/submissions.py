@@ -344,7 +344,7 @@ class Submissions:
     ) -> bool:
         """Whether a submission came before; if so, answer it."""
         # only to compare places
-        origin = asked.vehicle.where.frame.origin if isinstance(draft.goal, GoTo) else None
+        origin = asked.vehicle.where.origin if isinstance(draft.goal, GoTo) else None
         known = self.known(draft, confirmation=confirmation, origin=origin, now=now)
         if known is not None:
             self.answer_repeat(asked, known, now=now)

@@ -40,7 +40,7 @@ def state_of(parts: Parts, pilot: Pilot, *, is_late: bool, now: float) -> State:
         is_led=kind in (ModeKind.MANUAL, ModeKind.OTHER),
         is_urgent=tasks.immediate is not None,
         is_idle=tasks.is_idle,
-        is_stopping=pilot.guard.ladder.is_on,
+        is_stopping=pilot.guard.is_on,
         is_late=is_late,
         lingers=persona.is_held_before_places,
         has_failsafe=persona.has_loss_failsafe,

@@ -5,61 +5,56 @@ here is what follows for the vehicles. Packets carry the time at which the permi
 also those are dropped that leave late.
 """
 
-from collections.abc import Callable
 from math import inf
 
 from mav_tasks.engine.inputs import LeaseChanged
 from mav_tasks.engine.packet_sender import Fence
-from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.timers import Effect, Timers, Turn
 
 SHOWN = 1.5  # s after which heartbeats, one a second, have shown what the end of set-points did
 
 
-class LeaseWatch:
-    """The present lease. ``on_change`` is called when its trust has ended, or is back."""
+class LeaseWatch(Fence):
+    """The present lease: the fence of all packets to vehicles."""
 
-    def __init__(self, timers: Timers, on_change: Callable[..., None], *, is_shared: bool) -> None:
+    #: called when its trust has ended, or is back
+    on_change: Effect
+
+    def __init__(self, timers: Timers, *, is_shared: bool) -> None:
         """``is_shared``: the vehicles are a fleet's, so that nothing is permitted yet."""
-        self._on_change = on_change
-        self._timer = timers.timer(Turn.LINKS, self._end)
-        self.is_shared = is_shared
+        until = -inf if is_shared else inf
+        super().__init__(is_shared, until, until)
+        self._timer = timers.timer(Turn.LINKS, self._look)
         #: whether vehicles may be moved
         self.is_trusted = not is_shared
         self._is_leaving = False
         self._back_at = -inf  # s, when it was trusted again
-        #: of all packets to vehicles
-        self.fence = Fence(is_shared=is_shared)
         #: until when packets that stop vehicles may leave, s
-        self.stop_until = inf
-        if is_shared:
-            self.stop_until = self.fence.until = self.fence.relays_until = -inf
+        self.stop_until = until
 
     def __repr__(self) -> str:
-        return f"LeaseWatch({'trusted' if self.is_trusted else 'ended'}, {self.fence.until})"
+        return f"LeaseWatch({'trusted' if self.is_trusted else 'ended'}, {self.until})"
 
     def change(self, lease: LeaseChanged, *, now: float) -> None:
         """Take a new or renewed lease, or one that has ended."""
-        was_trusted = self.is_trusted
-        self.is_trusted = now < lease.move_until and not self._is_leaving
+        self.relays_until = -inf if self._is_leaving else lease.move_until
         self.stop_until = lease.stop_until
-        self.fence.relays_until = -inf if self._is_leaving else lease.move_until
-        self.fence.until = lease.move_until if self.is_trusted else lease.stop_until
-        self._timer.set(lease.move_until if self.is_trusted else inf)
-        if was_trusted is not self.is_trusted:
-            self._back_at = now if self.is_trusted else self._back_at
-            self._on_change(now=now)
+        self._look(now=now)
+
+    def leave(self, *, now: float) -> None:
+        """Only stop the vehicles from here on: this gateway leaves the fleet."""
+        self._is_leaving, self.is_trusted, self.relays_until = True, False, -inf
+        self._look(now=now)
 
     def has_silenced(self, *, now: float) -> bool:
         """Return whether vehicles may show a failsafe because no set-point was permitted."""
         return self.is_shared and (not self.is_trusted or now - self._back_at <= SHOWN)
 
-    def leave(self) -> None:
-        """Only stop the vehicles from here on: this gateway leaves the fleet."""
-        self._is_leaving, self.is_trusted = True, False
-        self.fence.until, self.fence.relays_until = self.stop_until, -inf
-        self._timer.set(inf)
-
-    def _end(self, *, now: float) -> None:
-        """Only stop the vehicles from here on: the lease was not renewed in time."""
-        self.is_trusted, self.fence.until = False, self.stop_until
-        self._on_change(now=now)
+    def _look(self, *, now: float) -> None:
+        """Look whether vehicles may be moved, or only stopped: it was not renewed in time."""
+        was_trusted, self.is_trusted = self.is_trusted, now < self.relays_until
+        self.until = self.relays_until if self.is_trusted else self.stop_until
+        self._timer.set(self.relays_until if self.is_trusted else inf)
+        if was_trusted is not self.is_trusted:
+            self._back_at = now if self.is_trusted else self._back_at
+            self.on_change(now=now)

@@ -183,7 +183,7 @@ class Parts:
             return
         if self.is_driven_by_others(now=now):
             raise Rejection(TaskReason.OTHER_CONTROLLER, "the rover is under manual control")
-        if not self.where.motion.is_still(now=now):
+        if not self.where.is_still(now=now):
             raise Rejection(TaskReason.WRONG_MODE, "under manual control and moving: stop it first")
 
     def view(self, *, drives_on: bool, now: float) -> VehicleView:
@@ -203,13 +203,13 @@ class Parts:
             in_control=control.in_control,
             refusal=REFUSALS[control.refused],
             is_not_ready=control.is_not_ready,
-            why_not_ready=self.failsafes.texts.why_not_ready(now=now),
-            motion=where.motion.latest(),
-            still=where.motion.is_still(now=now),
+            why_not_ready=self.failsafes.why_not_ready(now=now),
+            motion=where.latest(),
+            still=where.is_still(now=now),
             other_controller=self.authority.since_other(now=now) < watch.other_controller,
-            frame=where.frame.frame(),
+            frame=where.frame(),
             home=where.home,
-            is_home_old=self.requests.is_home_old and where.frame.home is not None,
+            is_home_old=self.requests.is_home_old and where.said_home is not None,
             is_fence_unknown=where.is_fence_unknown,
             is_outside_own_fence=self.failsafes.is_outside_fence,
             honours_yaw_rate=persona.honours_yaw_rate,

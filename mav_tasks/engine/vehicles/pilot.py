@@ -5,17 +5,13 @@ It checks that the vehicle obeys. A finding about a task is an event for the con
 
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
 
-from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.motion_guard import Found, Measure, MotionGuard, Told
+from mav_tasks.engine.vehicles.motion_guard import MotionGuard, Seen
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
 from mav_tasks.services.offboard import REGAINED_UNSEEN
 from mav_tasks.services.orders import Posture, Speeds
 from mav_tasks.services.phase import Phase
-from mav_tasks.settings import Settings
-from mav_tasks.tasks.driving.guidance import ZERO
 from mav_tasks.tasks.goal import ends_at_home
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Task
@@ -25,15 +21,6 @@ from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 UNSEEN_STOP = 3.0
 SHOWS_AGAIN = 1.5  # s after a gap, within which the next 1 Hz heartbeat comes
 BRAKES_FOR = 8.0  # s of set-points before the HOLD of a STOP, at most; the longest stop took 4 s
-GOES_ON = (DemandKind.TAKE, DemandKind.DRIVE)
-
-
-class Seen(NamedTuple):
-    """A finding that the control table decides about."""
-
-    event: Event
-    reason: TaskReason
-    words: str
 
 
 class Pilot:
@@ -46,16 +33,13 @@ class Pilot:
         #: when the next set-point is due
         self.clock = SetpointClock(parts.system_id, period=parts.settings.watch.setpoint_period)
         #: checks that it moves as it was told to
-        self.guard = MotionGuard(parts.where.motion, parts.settings.watch)
+        self.guard = MotionGuard(parts)
         self._is_closing = False
         self._regained_at = -inf  # s, when it was met driving
         self._is_back_home = False  # its last task returned home: disarm it even if others wait
 
     def __repr__(self) -> str:
-        return f"Pilot({self.clock!r}, {self.guard.ladder!r})"
-
-    def apply(self, settings: Settings) -> None:
-        self.guard.apply(settings.watch)
+        return f"Pilot({self.clock!r}, {self.guard!r})"
 
     def close(self) -> None:
         """Only stop the vehicle from here on: the server ends."""
@@ -75,15 +59,10 @@ class Pilot:
             parts.authority.revoke()
             self._note_end(ended)
             if ended.reason is TaskReason.STUCK:
-                parts.where.motion.doubt(until=now + UNSEEN_STOP)
+                parts.where.doubt(until=now + UNSEEN_STOP)
                 seen = self._view(now)
         self._obey(demand, seen, now=now)
-        found = []
-        for each in self.guard.look(self._told(demand, seen), now=now):
-            event = self._take_measure(each, demand, now=now)
-            if event is not None:
-                found.append(event)
-        return found
+        return self.guard.look(demand, seen, is_deaf=self._is_deaf(now=now), now=now)
 
     def send(self, *, now: float) -> None:
         """Send what is queued in this tick, and plan the next tick."""
@@ -94,7 +73,7 @@ class Pilot:
     def plan_tick(self, *, now: float) -> None:
         """Plan the next tick if there is anything to drive or to watch."""
         is_engaged = self._parts.control.is_engaged
-        if is_engaged or self._parts.tasks.active is not None or self.guard.ladder.is_on:
+        if is_engaged or self._parts.tasks.active is not None or self.guard.is_on:
             self.clock.plan(now=now)
         else:
             self.clock.stop()
@@ -107,11 +86,11 @@ class Pilot:
         parts = self._parts
         self._face(now=now)
         is_better = parts.persona.brakes_by_setpoints or self._may_be_a_car(now=now)
-        is_seen = self.guard.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
+        is_seen = parts.where.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
         brakes = brakes and is_better and is_seen
         longest = parts.settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
         parts.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
-        self.guard.ladder.begin(now=now)
+        self.guard.begin(now=now)
         parts.requests.end_performing()
         self._send_at_once(now=now)
 
@@ -132,7 +111,7 @@ class Pilot:
 
     def watch(self, *, now: float) -> None:
         """Watch from here on that it comes to stand."""
-        self.guard.ladder.begin(now=now)
+        self.guard.begin(now=now)
         self._send_at_once(now=now)
 
     def regain(self, *, now: float) -> None:
@@ -156,8 +135,9 @@ class Pilot:
 
         HOLD stops every vehicle, but some roll on in it.
         """
-        is_known = bool(self._parts.sticks.throttle(now=now)) and self.guard.is_fresh(now=now)
-        return self._parts.persona.brakes_by_setpoints and is_known
+        parts = self._parts
+        is_known = bool(parts.sticks.throttle(now=now)) and parts.where.is_fresh(now=now)
+        return parts.persona.brakes_by_setpoints and is_known
 
     def _send_at_once(self, *, now: float) -> None:
         self.clock.restart(now=now)
@@ -172,7 +152,7 @@ class Pilot:
     def _face(self, *, now: float) -> None:
         """Tell the offboard control what decides how the vehicle is asked to stand."""
         parts = self._parts
-        motion = parts.where.motion.latest()
+        motion = parts.where.latest()
         is_known = motion is not None and now - motion.at <= parts.settings.watch.position_lost
         yaw = motion.pose.yaw if motion is not None and is_known else None
         persona = parts.persona
@@ -191,64 +171,22 @@ class Pilot:
             case DemandKind.DRIVE:
                 wanted = demand.velocity
                 if not wanted.is_zero:
-                    parts.where.motion.standstill.may_move()
+                    parts.where.may_move()
                 control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 is_deaf, disarm = self._is_deaf(now=now), self._is_back_home
                 still = seen.still and not is_deaf and parts.hold_before.holder(now=now) is None
-                slows = is_deaf or self.guard.ladder.is_slowing(now=now)
+                slows = is_deaf or self.guard.is_slowing(now=now)
                 control.release(
                     still=still, disarm=disarm, now=now, is_slowing=slows, is_deaf=is_deaf
                 )
             case DemandKind.HAND_BACK:
-                slows = self.guard.ladder.is_slowing(now=now)
+                slows = self.guard.is_slowing(now=now)
                 control.release(still=seen.still, disarm=True, now=now, is_slowing=slows)
             case DemandKind.HALT if control.phase is not Phase.STOPPING:
                 self.begin_stop(brakes=True, now=now)
             case DemandKind.STOP | DemandKind.HALT:
                 control.stop(still=seen.still, heard=seen.heard, now=now)
-
-    def _told(self, demand: Demand, seen: VehicleView) -> Told:
-        """Return what the vehicle is told, for the motion guard."""
-        parts, wanted = self._parts, ZERO
-        control, persona = parts.control, parts.persona
-        if demand.kind is DemandKind.DRIVE:
-            wanted = demand.velocity
-        return Told(
-            forward=wanted.forward,
-            moves=control.in_control and not wanted.is_zero,
-            is_ours=control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING),
-            is_stopping=control.phase is Phase.STOPPING,
-            rolls_out=persona.rolls_out,
-            may_drive=control.in_control and not parts.tasks.is_stopped,
-            goes_on=demand.kind in GOES_ON,
-            is_released=not control.is_engaged,
-            is_held=parts.monitor.custom_mode == persona.hold_mode,
-            armed=parts.monitor.armed,
-            still=seen.still,
-            heard=seen.heard,
-        )
-
-    def _take_measure(self, found: Found, demand: Demand, *, now: float) -> Seen | None:
-        """Climb the stop ladder. Return an event if a task is concerned, for the control table."""
-        control, active = self._parts.control, self._parts.tasks.active
-        match found.measure:
-            case Measure.STOP_TASK if active is not None and active.state is TaskState.EXECUTING:
-                return Seen(Event.TOO_FAST, TaskReason.OVERSPEED, found.words)
-            case Measure.HOLD if demand.kind in GOES_ON:
-                words = "does not stop on zero setpoints: HOLD is set"
-                return Seen(Event.NOT_STANDING, TaskReason.STOP_UNCONFIRMED, words)
-            case Measure.HOLD_NOW | Measure.HOLD if control.in_control:
-                if not self._is_deaf(now=now):
-                    control.begin_release(now=now)
-            case Measure.HOLD_NOW:
-                control.hold_now(now=now)
-            case Measure.HOLD if control.phase is Phase.STOPPING:
-                control.hold_now(now=now)
-            case Measure.DISARM:
-                self._parts.note(found.words, now=now)
-                control.disarm_now(now=now)
-        return None
 
     def _is_deaf(self, *, now: float) -> bool:
         """Return whether a task stands after a loss, and no heartbeat has come yet.

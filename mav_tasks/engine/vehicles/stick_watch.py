@@ -21,17 +21,16 @@ class StickWatch:
     """The sticks of one vehicle: steering and throttle at the RCMAP_* defaults."""
 
     def __init__(self) -> None:
-        self._rest: tuple[int, int] | None = None
-        self._times = 0
-        self._throttle = 0
         self._said_at = -inf
+        self.forget()
 
     def __repr__(self) -> str:
         return f"StickWatch(rest={self._rest})"
 
     def forget(self) -> None:
         """Forget neutral after a restart of the vehicle: its transmitter may be another one."""
-        self._rest, self._times, self._throttle = None, 0, 0
+        self._rest: tuple[int, int] | None = None
+        self._times = self._throttle = 0
 
     def throttle(self, *, now: float) -> int:
         """Return 1 while the throttle is held forward of neutral, -1 while held back, else 0.
@@ -49,10 +48,7 @@ class StickWatch:
         if self._rest is None or not armed:
             self._rest, self._times, self._throttle = here, 0, 0
             return False
-        off = here[1] - self._rest[1]
+        steered, off = here[0] - self._rest[0], here[1] - self._rest[1]
         self._throttle = (off > LEAVES) - (off < -LEAVES)
-        moved = any(
-            abs(value - rest) > LEAVES for value, rest in zip(here, self._rest, strict=True)
-        )
-        self._times = self._times + 1 if moved else 0
+        self._times = self._times + 1 if self._throttle or abs(steered) > LEAVES else 0
         return self._times >= TIMES

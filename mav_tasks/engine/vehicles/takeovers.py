@@ -87,7 +87,7 @@ class Takeovers:
         A gateway that did not have it gets few positions: an ArduPilot streams on each link only
         what was requested there. One that stands by its heading cannot be braked without it.
         """
-        parts, motion = self._parts, self._parts.where.motion.latest()
+        parts, motion = self._parts, self._parts.where.latest()
         is_ours = parts.monitor.armed and parts.monitor.custom_mode == parts.persona.control_mode
         if not is_ours or parts.tasks.paused in TAKEN:
             return False
@@ -252,7 +252,7 @@ class Takeovers:
             and halts.is_by_word
             and not halts.is_undone
             and parts.authority.moves_by_older(halt=halts.at)
-            and not parts.where.motion.is_still(now=now)
+            and not parts.where.is_still(now=now)
         )
 
     def _look_for_parking(self, was_mode: int, mode: int, *, now: float) -> None:
@@ -279,13 +279,13 @@ class Takeovers:
         follows = (parts.persona.hold_mode, parts.persona.control_mode)
         is_driven = parts.is_driven_by_others(now=now)
         if parts.monitor.armed and (is_driven or parts.monitor.custom_mode not in follows):
-            parts.where.motion.standstill.may_move()
+            parts.where.may_move()
         else:
-            parts.where.motion.standstill.told_to_stand(now=now)
+            parts.where.told_to_stand(now=now)
 
     def _note_others(self, *, now: float) -> None:
         """Note that it moves without us: a HOLD after that means that somebody parked it."""
         parts = self._parts
         is_held = parts.monitor.custom_mode == parts.persona.hold_mode
         if parts.monitor.armed and not is_held and not parts.control.is_engaged:
-            self._others_drive |= not parts.where.motion.is_still(now=now)
+            self._others_drive |= not parts.where.is_still(now=now)

@@ -28,11 +28,11 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.battery import charge_of
 from mav_tasks.services.command_sender import Standing
 from mav_tasks.services.heartbeat import HeartbeatMonitor, kind_of
 from mav_tasks.services.identity import identity_of, uid_of
 from mav_tasks.services.persona import Persona
+from mav_tasks.services.sys_status import charge_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
@@ -232,7 +232,7 @@ class Vehicle:
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition):
             if isinstance(message, m.HomePosition):
                 self.requests.heard_home()
-            self.where.frame.receive(message)
+            self.where.receive_place(message)
             self._look_at_frame(now=now)
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
             self.requests.receive_of_plan(message, now=now)
@@ -250,7 +250,7 @@ class Vehicle:
             self._says.receive_parameter(message, now=now)
             self.joint.wake(now=now)
         elif isinstance(message, m.RcChannels):
-            sent_at = self.where.motion.clock.sent_at(message.time_boot_ms, now=now)
+            sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
             if self.parts.sticks.look(message, armed=self.armed, sent_at=sent_at):
                 self.joint.on(Event.STICK, Word(TaskReason.TAKEOVER, self.parts.actor), now=now)
         elif isinstance(message, m.AutopilotVersion):
@@ -265,8 +265,8 @@ class Vehicle:
             self._receive_heartbeat(heartbeat, now=now)
 
     def _look_at_frame(self, *, now: float) -> None:
-        if self.where.frame.changed:
-            self.where.frame.changed = False
+        if self.where.has_moved_frame:
+            self.where.has_moved_frame = False
             self.parts.note("changed the origin of its local frame", now=now)
             self.tasks.hold(TaskReason.FRAME_RESET, now=now)
 
@@ -370,8 +370,7 @@ class Vehicle:
         """Apply new settings, except those that need a restart (see the table of keys)."""
         self.parts.settings = settings
         self._monitor.lost_after = settings.watch.heartbeat_lost
-        self.where.motion.apply(settings.watch)
-        self.pilot.apply(settings)
+        self.where.watch = settings.watch
         self.requests.apply(settings.watch)
         self._says.apply(settings)
 

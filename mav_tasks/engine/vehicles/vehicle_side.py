@@ -4,26 +4,22 @@ Any bytes may come in. Only a packet with a good CRC, from a known or newly hear
 changes anything.
 """
 
-from collections import deque
 from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
+from functools import partial
 from math import inf
 
-from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import Outgoing, Peer, Place
-from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.snapshot import Reach
-from mav_tasks.engine.timers import Timers
+from mav_tasks.engine.timers import Timer, Turn
 from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.deadline_heap import DeadlineHeap
 from mav_tasks.engine.vehicles.hands import Word
-from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
-from mav_tasks.engine.vehicles.strangers import MOTION, Beat, Moved, Strangers
+from mav_tasks.engine.vehicles.system_ids import MOTION, NANO, Beat, Moved, Strangers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.codec import Decoder, Packer
+from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import gcs_heartbeat, kind_of
@@ -31,13 +27,9 @@ from mav_tasks.services.orders import DRIVEN, Orders
 from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
-from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
-NANO = 1e9  # TIMESYNC is in ns
-ASKED = 64  # TIMESYNC requests, one a second and link, whose answers are still accepted
 OLD_NEWS = 0.3  # s after a stall of this process, in which packets may have waited to be read
 #: s without a heartbeat, or since it was taken without any, after which another gateway may get a
 #: vehicle: longer than a restart of its radio; and s for which a halt is sent to a silent vehicle
@@ -45,7 +37,6 @@ GONE = 5.0
 #: s in which no task starts on a vehicle that this gateway has got: set-points of another
 #: controller, who sends several a second, show that it is there
 LISTENS = 1.0
-MOST_NOTES = 256
 MOST_NAMED = 5  # tasks named in one text
 ANOTHER = (
     "is another vehicle now. If its tasks are for this one, press a Held button for each held"
@@ -59,109 +50,91 @@ ECHO = (
 
 #: messages that only a controller of the vehicle sends
 SETPOINTS = frozenset(
-    {m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id, m.SetAttitudeTarget.id}
+    kind.id
+    for kind in (m.SetPositionTargetLocalNed, m.SetPositionTargetGlobalInt, m.SetAttitudeTarget)
 )
 #: what the server itself decodes; everything else is forwarded unread
-USED = frozenset(
-    {
-        m.Heartbeat.id,
-        m.Attitude.id,
-        m.LocalPositionNed.id,
-        m.GlobalPositionInt.id,
-        m.GpsGlobalOrigin.id,
-        m.HomePosition.id,
-        m.AutopilotVersion.id,
-        m.CommandAck.id,
-        m.MissionAck.id,
-        m.MissionCurrent.id,
-        m.MissionRequest.id,
-        m.MissionRequestInt.id,
-        m.ParamValue.id,
-        m.RcChannels.id,
-        m.Statustext.id,
-        m.SysStatus.id,
-        m.Timesync.id,
-    }
-    | SETPOINTS
+USED = SETPOINTS.union(
+    kind.id
+    for kind in (
+        *(m.Heartbeat, m.Attitude, m.LocalPositionNed, m.GlobalPositionInt, m.GpsGlobalOrigin),
+        *(m.HomePosition, m.AutopilotVersion, m.CommandAck, m.MissionAck, m.MissionCurrent),
+        *(m.MissionRequest, m.MissionRequestInt, m.ParamValue, m.RcChannels, m.Statustext),
+        *(m.SysStatus, m.Timesync),
+    )
 )
 NO_AUTOPILOT = MavAutopilot.INVALID
 NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
 
 
-class VehicleSide:
-    """The vehicles by system id, and the vehicle links."""
+class VehicleSide(VehicleLinks):
+    """The vehicles by system id, and when each has something to do.
 
-    def __init__(
-        self,
-        *,
-        queue: list[Outgoing],
-        packer: Packer,
-        signatures: Signatures,
-        registry: TaskRegistry,
-        fleet: Fleet,
-        timers: Timers,
-        settings: Settings,
-        is_shared: bool,
-    ) -> None:
-        """``is_shared``: other gateways have vehicles, too; this one serves those of ``take``."""
-        self._signatures = signatures
-        self._registry = registry
-        self._fleet = fleet
-        self._settings = settings
-        #: the address under which the server speaks to vehicles
-        self.our_address = _own_address(settings)
+    Only the deadlines of changed vehicles are planned again, so that an input costs the same with
+    two rovers as with two hundred.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.lease.on_change = self._change_of_lease
         self._decoder = Decoder()
         #: packet counts of the vehicle links
         self.counts = self._decoder.counts
-        #: the deadlines of all vehicles
-        self.deadline_heap = DeadlineHeap(timers)
-        #: note that a vehicle that was only looked at is about to be changed
-        self.mark_dirty = self.deadline_heap.mark_dirty
-        self._noted: set[str] = set()
         self._answer: Packet | None = None  # the last answer to our TIMESYNC
-        self._asked: deque[int] = deque(maxlen=ASKED)  # time stamps of our TIMESYNC requests, ns
-        self._question = m.Timesync(0, 0)  # refilled for each request
-        self._vehicles: dict[int, Vehicle] = {}
-        #: all vehicles, read-only
-        self.all = self._vehicles.values()
         #: all vehicles by system id, read-only
         self.by_id: Mapping[int, Vehicle] = self._vehicles
         #: returns a vehicle, read-only
         self.look_at = self._vehicles.get
-        #: what may be sent to them now
-        self.lease = LeaseWatch(timers, self._change_of_lease, is_shared=is_shared)
-        #: those that it has, and since when; None: all
-        self._ours: dict[int, float] | None = {} if is_shared else None
+        self._ours: dict[int, float] = {}  # those that this gateway of a fleet has, and since when
         self._strangers = Strangers()
         #: the ids at which another vehicle answers now; the reader clears it
         self.gone: list[int] = []
-        #: the links and endpoints
-        self.links = VehicleLinks(
-            self._vehicles,
-            queue=queue,
-            packer=packer,
-            signatures=signatures,
-            fence=self.lease.fence,
-            settings=settings,
-            registry=registry,
-            timers=timers,
-            beat=self._beat,
-            note_once=self.note_once,
-        )
+        #: vehicles that may have changed since they were settled
+        self.touched: dict[int, Vehicle] = {}
+        self._due: dict[int, Timer] = {}
+        self._awaiting: dict[int, Vehicle] = {}  # those whose next task waits for the store only
+        self._last_words: dict[int, tuple[Outgoing, ...]] = {}
+        #: zero and HOLD for every vehicle that is being driven
+        self.emergency_stop_packets: tuple[Outgoing, ...] = ()
+
+    def mark_dirty(self, vehicle: Vehicle) -> None:
+        """Note that a vehicle that was only looked at is about to be changed."""
+        self.touched[vehicle.system_id] = vehicle
+
+    def plan(self) -> None:
+        """Set the timers of the changed vehicles."""
+        for system_id, vehicle in self.touched.items():
+            if timer := self._due.get(system_id):
+                timer.set(vehicle.next_deadline())
+
+    def settle(self) -> list[Vehicle]:
+        """Plan the changed vehicles, update what is kept of them, and return them."""
+        self.plan()
+        touched = list(self.touched.values())
+        self.touched.clear()
+        for vehicle in touched:
+            system_id = vehicle.system_id
+            if vehicle.tasks.turns.awaits_commit:
+                self._awaiting[system_id] = vehicle
+            else:
+                self._awaiting.pop(system_id, None)
+            engaged = vehicle.control.is_engaged
+            self._note_last_words(
+                system_id, vehicle.requests.emergency_stop_packets if engaged else ()
+            )
+        return touched
 
     def get(self, system_id: int) -> Vehicle | None:
         """Return a vehicle in order to change it."""
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None:
-            self.deadline_heap.mark_dirty(vehicle)
+            self.mark_dirty(vehicle)
         return vehicle
 
     def addressed_by(self, system_id: int) -> list[Vehicle]:
         """Return the vehicles that a target_system addresses; 0 addresses all of them."""
-        if system_id:
-            vehicle = self.get(system_id)
-            return [] if vehicle is None else [vehicle]
-        return [vehicle for vehicle in map(self.get, sorted(self._vehicles)) if vehicle is not None]
+        numbers = (system_id,) if system_id else sorted(self._vehicles)
+        return [vehicle for vehicle in map(self.get, numbers) if vehicle is not None]
 
     def stop_unheard(self, system_id: int, *, clear: bool, actor: str, now: float) -> list[int]:
         """Latch STOP for vehicles of an earlier run that were not heard yet. Return their ids.
@@ -189,7 +162,6 @@ class VehicleSide:
 
         One that was driven is stopped at once if its last heartbeat came just now.
         """
-        assert self._ours is not None, "a server without a fleet has all vehicles"
         for vehicle in vehicles:
             self._ours[vehicle] = now
             if beat := self._strangers.take_beat(vehicle, now=now):
@@ -199,19 +171,17 @@ class VehicleSide:
         """Return the vehicles that are heard, those that this gateway has, and can forget."""
         since = now - self._settings.watch.heartbeat_lost
         heard = {each.system_id for each in self.all if each.is_heard(now=now)}
-        heard |= self._strangers.heard_since(since)
-        ours = self._ours or {}
-        strays = {each for each in ours if each not in heard and self.is_stray(each, now=now)}
-        return Reach(frozenset(heard), frozenset(ours), frozenset(strays))
+        heard |= {number for number, beat in self._strangers.beats.items() if beat.at >= since}
+        silent = self._ours.keys() - heard
+        strays = frozenset(each for each in silent if self._is_stray(each, now=now))
+        return Reach(frozenset(heard), frozenset(self._ours), strays)
 
-    def is_stray(self, system_id: int, *, now: float) -> bool:
+    def _is_stray(self, system_id: int, *, now: float) -> bool:
         """Return whether a vehicle that this gateway has is silent, idle, and stored as it is.
 
         Zeros and HOLD are still sent to it, because it has not shown HOLD, if a task was driving
         it: they go on for ever, and keep nobody from it. Its next gateway stops it, too.
         """
-        if self._ours is None or system_id not in self._ours:
-            return False
         vehicle = self._vehicles.get(system_id)
         heard_at = self._ours[system_id] if vehicle is None else vehicle.heard_at
         if now - heard_at < max(GONE, self._settings.watch.heartbeat_lost):
@@ -223,20 +193,20 @@ class VehicleSide:
     def _drop(self, system_id: int) -> bool:
         """Drop all control of a vehicle. Return whether it was driven."""
         vehicle = self._vehicles.pop(system_id, None)
-        self.deadline_heap.forget(system_id)
         if vehicle is None:
             return False
-        self.links.forget(vehicle)
+        self.touched.pop(system_id, None)
+        self._awaiting.pop(system_id, None)
+        self._timers.forget(self._due.pop(system_id))
+        self._note_last_words(system_id, ())
+        self._leave(vehicle)
         return vehicle.shut()
 
     def forget(self, system_id: int) -> None:
         """Forget a vehicle, which another gateway may have from here on."""
-        assert self._ours is not None, "a server without a fleet has all vehicles"
         del self._ours[system_id]
         self._drop(system_id)
-        self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
-        if self._answer is not None and self._answer.system_id == system_id:
-            self._answer = None
+        self._noted = {each for each in self._noted if each[0] != system_id}
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle that has a task of a revoked key, even if another key's task drives.
@@ -266,26 +236,22 @@ class VehicleSide:
     def shut_down(self, *, now: float) -> None:
         """Stop what we drive: the server ends. In a fleet, other gateways get the vehicles."""
         if self.lease.is_shared:
-            self.lease.leave()
+            self.lease.leave(now=now)
         for vehicle in self.addressed_by(0):
-            if self.lease.is_shared:
-                vehicle.joint.leave(now=now)
-            else:
-                vehicle.joint.shut_down(now=now)
+            joint = vehicle.joint
+            (joint.leave if self.lease.is_shared else joint.shut_down)(now=now)
 
     def commit(self, *, now: float) -> None:
         """Start the tasks that waited only for events that are durable now."""
-        for vehicle in self.deadline_heap.awaiting_commit():
-            self.deadline_heap.mark_dirty(vehicle)
+        for vehicle in list(self._awaiting.values()):
+            self.mark_dirty(vehicle)
             vehicle.joint.step(now)
 
     def apply(self, settings: Settings) -> None:
-        self._settings = settings
-        self.our_address = _own_address(settings)
-        self.links.apply(settings)
+        super().apply(settings)
         for vehicle in self.all:
             vehicle.apply(settings)
-            self.deadline_heap.mark_dirty(vehicle)  # its deadlines may change
+            self.mark_dirty(vehicle)  # its deadlines may change
 
     def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Vehicle | None:
         """Process a packet. Return the vehicle in whose name to forward it, or None.
@@ -301,48 +267,47 @@ class VehicleSide:
             self.counts.unknown += 1
         if self._signatures.admit(link, peer, packet) is None:
             return None
+        place, number = (link, peer), packet.system_id
         if packet.source == self.our_address or packet.message_id in SETPOINTS:
-            if self._ours is not None and isinstance(message, m.Heartbeat | m.Timesync):
+            if self.lease.is_shared and isinstance(message, m.Heartbeat | m.Timesync):
                 return None  # another gateway's, which listens here, too
-            self._note_intruder((link, peer), packet, message, now=now)
+            self._note_intruder(place, packet, message, now=now)
             return None
-        vehicle = self.get(packet.system_id)
+        vehicle = self.get(number)
         from_autopilot, beat = packet.component_id == AUTOPILOT, None
         if isinstance(message, m.Heartbeat) and from_autopilot:
-            beat = Beat(link, peer, packet, message, now)
+            beat = Beat(place, packet, message, now)
         if vehicle is None:
             if isinstance(message, MOTION) and from_autopilot:
-                self._strangers.note_motion(packet.system_id, Moved(link, peer, message, now))
+                self._strangers.moved[number, message.id] = Moved(place, message, now)
             if beat is None:
                 return None
-            if self._ours is not None and packet.system_id not in self._ours:
+            if self.lease.is_shared and number not in self._ours:
                 if self._persona_of(beat) is not None:
-                    self._strangers.note_beat(beat)  # another gateway's, which this one may get
+                    self._strangers.beats[number] = beat  # another gateway's, which it may get
                 return None
             vehicle = self._meet(beat, now=now)
         elif beat and beat.message.autopilot == NO_AUTOPILOT:
             return None  # from a program that uses the rover's address
         else:
-            number = vehicle.system_id
-            answer = message if isinstance(message, m.Timesync) else None
-            if answer is not None and answer.ts1 not in self._asked:
-                answer = None
-            if answer is not None and answer.tc1 and from_autopilot:
-                self.links.way(number, (link, peer), now=now).note_answer(answer, now=now)
-            if vehicle.requests.place != (link, peer) and not (
+            answer = told = None  # an answer to us; one that shows the autopilot's clock
+            if isinstance(message, m.Timesync) and message.ts1 in self._asked:
+                answer, told = packet, message if message.tc1 and from_autopilot else None
+            if told is not None:
+                self._way(number, place, now=now).note_answer(told, now=now)
+            if vehicle.requests.place != place and not (
                 from_autopilot
                 and message is not None
-                and self.links.moves(vehicle, link, peer, message, now=now)
+                and self._moves(vehicle, place, message, now=now)
             ):
                 return None
-            if answer is not None:
-                self._answer = packet
-                if answer.tc1 and from_autopilot:
-                    offset = vehicle.where.motion.clock.offset
-                    offset.exchange(answer.ts1 / NANO, answer.tc1 / NANO, now=now)
+            self._answer = answer or self._answer
+            if told is not None:
+                clock = vehicle.where.clock
+                clock.exchange(told.ts1 / NANO, told.tc1 / NANO, now=now)
             if from_autopilot and vehicle.shows_another(message, now=now):
                 latest = vehicle.parts.monitor.latest
-                vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
+                vehicle = self._succeed(beat or Beat(place, packet, latest, now), now=now)
         if vehicle is None:
             return None
         if from_autopilot:
@@ -362,38 +327,42 @@ class VehicleSide:
 
     def check_late(self, *, now: float) -> None:
         """After a delay, and before anything else, stop the vehicles that drove on without us."""
-        due = min(
-            self.deadline_heap.next_deadline(), *(link.heartbeat.at for link in self.links), inf
-        )
+        timers = *self._due.values(), *(link.heartbeat for link in self.links.values())
+        due = min((timer.at for timer in timers), default=inf)
         if due + self._settings.watch.late_tick >= now:
             return
         for vehicle in self.all:
-            self.deadline_heap.mark_dirty(vehicle)
+            self.mark_dirty(vehicle)
             vehicle.control.outdated(until=now + OLD_NEWS)
             vehicle.joint.check_late(now=now)
 
     def _change_of_lease(self, *, now: float) -> None:
         """Stop the vehicles that another gateway may get, or let their tasks go on."""
         for vehicle in self.all:
-            self.deadline_heap.mark_dirty(vehicle)
+            self.mark_dirty(vehicle)
             if self.lease.is_trusted:
                 vehicle.joint.wake(now=now)
             else:
                 vehicle.joint.on(Event.LEASE_ENDS, Word(), now=now)
 
-    def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
-        """Send a heartbeat and a TIMESYNC request to each endpoint of a link, each second."""
-        self._question.ts1 = round(now * NANO)
-        self._asked.append(self._question.ts1)
-        for outlet in outlets.values():
-            is_ours = self.links.has_vehicle_at(outlet.link, outlet.peer)
-            outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=is_ours)
-            outlet.send_unfenced(self._question, self.our_address, is_ours=is_ours)
+    def _handle_deadline(self, vehicle: Vehicle, *, now: float) -> None:
+        self.mark_dirty(vehicle)
+        vehicle.handle_deadline(now=now)
+
+    def _note_last_words(self, system_id: int, words: tuple[Outgoing, ...]) -> None:
+        """Note the packets that stop a vehicle if the engine fails."""
+        if words != self._last_words.get(system_id, ()):
+            self._last_words[system_id] = words
+            self.emergency_stop_packets = sum(self._last_words.values(), ())
 
     def _succeed(self, beat: Beat, *, now: float) -> Vehicle | None:
-        """Meet another vehicle at a known address: nothing of the old one's control survives."""
+        """Meet another vehicle at a known address: nothing of the old one's control survives.
+
+        What waits to leave for the old one is dropped, except HOLD.
+        """
         number = beat.packet.system_id
-        self.links.withdraw(self._vehicles[number])
+        old = self._vehicles[number].requests.place
+        self._queue[:] = [e for e in self._queue if e.is_first or (e.link, e.peer) != old]
         if self._drop(number):
             self._ask_to_hold(beat)
         self.gone.append(number)
@@ -403,13 +372,13 @@ class VehicleSide:
 
     def _ask_to_hold(self, beat: Beat) -> None:
         """Ask what is not served, or only just heard, to stay where it is."""
-        if way := self.links.meets(beat.link, beat.peer):
+        if outlet := self._meets(beat.place):
             orders = Orders(beat.packet.source, persona_of(beat.message) or ARDUPILOT)
-            way[0].send(orders.staying_there(beat.message.type), self.our_address, first=True)
+            outlet.send(orders.staying_there(beat.message.type), self.our_address, first=True)
 
     def _meet(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
-        link_name, peer, packet, heartbeat, _ = beat
+        place, packet, heartbeat, _ = beat
         number = packet.system_id
         persona, tasks = self._persona_of(beat), self._fleet.get(number)
         if (
@@ -421,10 +390,9 @@ class VehicleSide:
             return None
         if persona is None:
             return None
-        way = self.links.meets(link_name, peer)
-        if way is None:
+        is_new, outlet = self._is_gone(place), self._meets(place)
+        if outlet is None:
             return None
-        outlet, is_new = way
         if is_new:
             outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=True)
         vehicle = Vehicle(
@@ -436,16 +404,18 @@ class VehicleSide:
             tasks=self._fleet.of(number),
             settings=self._settings,
             lease=self.lease,
-            may_arm=self.links.may_arm(link_name),
+            may_arm=self._may_arm(place[0]),
             now=now,
         )
-        if self._ours is not None:
+        if self.lease.is_shared:
             vehicle.parts.listens_until = now + LISTENS
         self._vehicles[number] = vehicle
-        self.links.forget_budgets()
-        self.deadline_heap.mark_dirty(vehicle)
+        do = partial(self._handle_deadline, vehicle)
+        self._due[number] = self._timers.timer(Turn.VEHICLES, do, number=number)
+        self._budgets.clear()
+        self.mark_dirty(vehicle)
         self._registry.record(VehicleSeen(number, f"found ({persona.name})", now))
-        for moved in self._strangers.take_motion(number, link_name, peer, now=now):
+        for moved in self._strangers.take_motion(number, place, now=now):
             vehicle.where.receive(moved.message, now=moved.at, not_after=moved.at)
         was_driven = self._fleet.was_driven(number)
         halt = self._fleet.last_halt(number, now=now)
@@ -455,22 +425,18 @@ class VehicleSide:
 
     def _persona_of(self, beat: Beat) -> Persona | None:
         """Return the persona of the autopilot that sends a heartbeat; None: it is not driven."""
-        _, _, packet, heartbeat, now = beat
-        if heartbeat.type in NOT_VEHICLES:
+        heartbeat, number = beat.message, beat.packet.system_id
+        # 0 addresses every vehicle, and our own id belongs to no vehicle
+        if heartbeat.type in NOT_VEHICLES or number in (0, self.our_address.system_id):
             return None
-        if packet.system_id in (0, self.our_address.system_id):
-            return None  # 0 addresses every vehicle, and our own id belongs to no vehicle
-        if heartbeat.type not in DRIVEN:  # other types give the mode numbers other meanings
+        if heartbeat.type in DRIVEN:
+            persona = persona_of(heartbeat, honours_yaw_rate=self._settings.yaw_rate == "honoured")
+            words = f"has autopilot type {heartbeat.autopilot}, which is not supported: not driven"
+        else:  # other types give the mode numbers other meanings
+            persona = None
             words = f"has vehicle type {heartbeat.type}, not that of a rover: not driven"
-            self.note_once(packet.system_id, words, now=now)
-            return None
-        persona = persona_of(heartbeat, honours_yaw_rate=self._settings.yaw_rate == "honoured")
         if persona is None:
-            self.note_once(
-                packet.system_id,
-                f"has autopilot type {heartbeat.autopilot}, which is not supported: not driven",
-                now=now,
-            )
+            self.note_once(number, words, now=beat.at)
         return persona
 
     def _note_intruder(
@@ -481,24 +447,11 @@ class VehicleSide:
         What this server has sent itself drives nothing. A rover passes it from link to link, too.
         """
         target = getattr(message, "target_system", 0)
-        sent_to = self.links.where_sent(packet, place)
+        sent_to = self._where_sent(packet, place)
         for vehicle in self.all:
             there = vehicle.requests.place
             if sent_to == {place} and there == place:
                 self.note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
             elif not sent_to and target in (0, vehicle.system_id) and there[0] == place[0]:
-                self.deadline_heap.mark_dirty(vehicle)
+                self.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
-
-    def note_once(self, system_id: int, text: str, *, now: float) -> bool:
-        """Report a text about a vehicle unless it was reported before; return whether it is new."""
-        key = f"{system_id} {text}"
-        is_new = key not in self._noted and len(self._noted) < MOST_NOTES
-        if is_new:
-            self._noted.add(key)
-            self._registry.record(VehicleNoted(system_id, text, now))
-        return is_new
-
-
-def _own_address(settings: Settings) -> Address:
-    return Address(settings.identity.system_id, settings.identity.component_id)
