@@ -76,10 +76,7 @@ class Fleet:
         """Forget a vehicle and its tasks, which are stored; return the ids of these."""
         self._of.pop(vehicle, None)
         self._was_driven.discard(vehicle)
-        self.room.forget(vehicle)
-        tasks = self._registry.forget(vehicle)
-        self.room.forgotten(now=now)
-        return tasks
+        return self.room.forget(vehicle, now=now)
 
     def apply(self, settings: Settings) -> None:
         self._settings = settings
@@ -91,7 +88,7 @@ class Fleet:
         """Load an earlier run: hold the tasks that ran, pause queues that must not go on alone."""
         if restored.gateway:
             self._registry.ids.share()
-            self.room.share()
+            self.room.is_shared = True
         else:
             self._registry.ids.count_from(restored.next_id)
         is_unclean = self._settings.on_restart == "pause" and not restored.ended_well

@@ -139,11 +139,11 @@ class Forecast:
         active = tasks.active
         if active is None:
             first = tasks.queue.first()
-            blocked = first is not None and tasks.turns.blocker_of(first)
+            blocked = first is not None and tasks.blocker_of(first)
             return UNKNOWN if blocked else Estimate(0.0, self._known.pose)
         if active.state is S.CANCELLING:
             return Estimate(SETTLING, self._known.pose)
-        if active.state not in (S.STARTING, S.EXECUTING) or tasks.turns.blocker_of(active.id):
+        if active.state not in (S.STARTING, S.EXECUTING) or tasks.blocker_of(active.id):
             return UNKNOWN
         return time_left(active.goal, active.progress, self._known)
 
@@ -152,6 +152,6 @@ def known_of(tasks: VehicleTasks) -> Known:
     """Return the inputs for an estimate of a vehicle's tasks."""
     seen = tasks.seen
     if seen is None:
-        return Known(tasks.terms.driving)
+        return Known(tasks.driving)
     pose = None if seen.motion is None else seen.motion.pose
-    return Known(tasks.terms.driving, pose, seen.home, seen.origin)
+    return Known(tasks.driving, pose, seen.home, seen.origin)

@@ -30,7 +30,7 @@ def estimate(
     estimates are made: the end of a running task, and both times of a scheduled one.
     """
     if task.state in (S.STARTING, S.EXECUTING):
-        is_kept = task.state is S.STARTING and tasks.turns.blocker_of(task.id)
+        is_kept = task.state is S.STARTING and tasks.blocker_of(task.id)
         left = time_left(task.goal, task.progress, known_of(tasks)).seconds
         return 0.0, nan if is_kept else left
     if forecast is None:
@@ -54,7 +54,7 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
         case S.QUEUED:
             return _why_queued(tasks, task)
         case S.HELD | S.STARTING:
-            return tasks.turns.blocker_of(task.id) or task.reason
+            return tasks.blocker_of(task.id) or task.reason
         case _:
             return task.reason
 
@@ -89,4 +89,4 @@ def _why_queued(tasks: VehicleTasks, task: Task) -> TaskReason:
         return R.STOP_UNCONFIRMED
     if tasks.executor.task_id is not None or tasks.queue.position(task.id):
         return R.BEHIND_OTHERS
-    return tasks.turns.blocker_of(task.id)
+    return tasks.blocker_of(task.id)

@@ -80,6 +80,11 @@ class TaskRegistry:
         """Return how many tasks of a vehicle are in each state; the index is the TaskState."""
         return list(self._counts.get(vehicle, [0] * STATES))
 
+    def count_waiting(self, vehicle: int) -> int:
+        """Return how many tasks of a vehicle have not started."""
+        counts = self._counts.get(vehicle)
+        return 0 if counts is None else sum(map(counts.__getitem__, WAITING))
+
     def restore(self, tasks: Sequence[Task], *, next_id: int = 0) -> None:
         """Load the tasks of an earlier run, all of them durable; ``next_id`` 0: as before."""
         if next_id:
@@ -258,14 +263,11 @@ class TaskRegistry:
         runs = (self._tasks[each] for each in self.unplanned if each in self._tasks)
         return next((task.id for task in runs if task.terms.series == series), None)
 
-    def unplanned_of(self, vehicle: int) -> list[Task]:
-        """Return the runs of a vehicle that are over, and which another one is to follow."""
-        over = (self._tasks[each] for each in self.unplanned if each in self._tasks)
-        return [task for task in over if task.vehicle == vehicle and not why_series_ends(task)]
-
     def runs_of(self, vehicle: int) -> list[Task]:
-        """Return the runs of a vehicle's series that are not over, one of each series."""
-        runs = (self._tasks[task_id] for task_id in self.runs.values())
+        """Return a run of each of a vehicle's series: it is not over, or another is to follow."""
+        over = [self._tasks[each] for each in self.unplanned if each in self._tasks]
+        runs = [self._tasks[task_id] for task_id in self.runs.values()]
+        runs += [task for task in over if not why_series_ends(task)]
         return [task for task in runs if task.vehicle == vehicle]
 
     def is_awaited_at(self, link: str, endpoint: str) -> bool:

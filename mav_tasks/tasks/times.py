@@ -1,6 +1,5 @@
 """Start times and deadlines of waiting tasks, in monotonic time."""
 
-from collections.abc import Iterable
 from heapq import heapify, heappop, heappush
 from math import inf
 
@@ -63,7 +62,7 @@ class Times:
 
     def __init__(self) -> None:
         self.starts, self.deadlines = Schedule(), Schedule()
-        #: UTC minus monotonic time, s
+        #: UTC minus monotonic time, s; after a change ``note`` all waiting tasks again
         self.wall_offset = 0.0
 
     def __repr__(self) -> str:
@@ -98,13 +97,7 @@ class Times:
             self.starts.put(task.id, self.start(task.terms))
             self.deadlines.put(task.id, self.deadline(task.terms))
 
-    def forget(self, tasks: Iterable[TaskId]) -> None:
-        """Forget the times of these tasks, which do not wait any more."""
-        for task_id in tasks:
-            self.starts.put(task_id, None)
-            self.deadlines.put(task_id, None)
-
-    def set_wall_offset(self, offset: float, tasks: Iterable[Task]) -> None:
-        """Set UTC minus monotonic time, s, which moves the times of all waiting tasks."""
-        self.wall_offset = offset
-        self.note(*tasks)
+    def forget(self, task_id: TaskId) -> None:
+        """Forget the times of a task that does not wait any more."""
+        self.starts.put(task_id, None)
+        self.deadlines.put(task_id, None)

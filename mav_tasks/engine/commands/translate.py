@@ -159,7 +159,7 @@ def task_status(
         submitter_system=submitter.system_id,
         submitter_component=submitter.component_id,
         submitter_link=link_number,
-        text=_cut(_words(task, reason, tasks.turns.words_of_blocker(task.id)), TEXT),
+        text=_cut(_words(task, reason, tasks.words_of_blocker(task.id)), TEXT),
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
         label=task.terms.label.encode(),
         series=task.terms.series,

@@ -58,7 +58,7 @@ class DeadlineHeap:
         self.touched.clear()
         for vehicle in touched:
             system_id = vehicle.system_id
-            if vehicle.tasks.turns.awaits_commit:
+            if vehicle.tasks.awaits_commit:
                 self._awaiting[system_id] = vehicle
             else:
                 self._awaiting.pop(system_id, None)

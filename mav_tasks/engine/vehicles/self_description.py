@@ -56,7 +56,7 @@ class SelfDescription:
         """Process any parameter of the vehicle."""
         self._parts.requests.loss_failsafe.receive(message)
         self._parts.requests.cruise.receive(message)
-        self._parts.tasks.terms.cruises(self._parts.requests.cruise.speed)
+        self._parts.tasks.cruises(self._parts.requests.cruise.speed)
         self._note_failsafe(now=now)
         turning = self._parts.requests.turning
         before = turning.turning
@@ -91,7 +91,7 @@ class SelfDescription:
             self._parts.note(news, now=now)
         elif news:
             self._parts.registry.record(VehicleSeen(self._parts.system_id, news, now))
-        self._parts.tasks.terms.brakes(self._known.stop)
+        self._parts.tasks.brakes(self._known.stop)
         persona = self._known.persona
         speaks_alike = (persona.setpoint_mask, persona.setpoint_frame) == (
             self._parts.persona.setpoint_mask,

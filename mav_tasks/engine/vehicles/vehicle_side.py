@@ -415,7 +415,7 @@ class VehicleSide:
         if (
             tasks
             and heartbeat.autopilot != NO_AUTOPILOT
-            and not self._strangers.is_alone(beat, (kind_of(heartbeat), tasks.terms.uid))
+            and not self._strangers.is_alone(beat, (kind_of(heartbeat), tasks.uid))
         ):
             self.note_once(number, SHARED, now=now)
             return None
