@@ -11,8 +11,8 @@ from math import hypot
 
 from mav_tasks.errors import Rejection
 from mav_tasks.latest import keep_latest
-from mav_tasks.tasks.frames import to_local
-from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place
+from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.goal import GlobalPlace, GoTo
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
@@ -27,7 +27,7 @@ SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
 #: person without an answer tries again within minutes
 NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
-PACKETS = 1_000  # per client, for rule 1; CommandReceiver has a list, too, but not after a restart
+RECENT = 3_000  # entries of one client; CommandReceiver has a list, too, but not after a restart
 SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
 MANY_CLIENTS = 256  # remembered; beyond this, those with old submissions are forgotten first
 
@@ -69,12 +69,13 @@ class _Last:
         return Known(self.task_id, rule, is_news)
 
 
+#: under which a submission is remembered: a packet, or a place, or a command, to a vehicle or ANY
+_Mark = tuple[str, int, int]
+
+
 @dataclass(slots=True)
 class _Client:
-    #: by the vehicle that was named, or ANY; and by command
-    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)
-    goals: dict[int, _Last] = field(default_factory=dict)  # by that vehicle
-    packets: dict[str, _Last] = field(default_factory=dict)
+    last: dict[_Mark, _Last] = field(default_factory=dict)
     at: float = 0.0
 
 
@@ -89,15 +90,9 @@ class SubmissionDeduplicator:
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Load the tasks of an earlier run, oldest first: all nonces, and recent submissions."""
         for task in tasks:
-            if task.is_made:
-                continue  # nobody submitted it
-            nonce = task.marks.nonce
-            if nonce:
-                self._nonces[_key(task.submitter, nonce)] = task.id
-            # later than now: the clock was set back since, or was another gateway's
-            at = min(task.submitted_at, now)
-            if now - at <= LONGEST and not (nonce and not isinstance(task.goal, GoTo)):
-                self.remember(task, at=at, now=now)
+            if not task.is_made:  # nobody submitted that
+                # later than now: the clock was set back since, or was another gateway's
+                self.remember(task, at=min(task.submitted_at, now), now=now)
 
     def known(
         self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float
@@ -113,25 +108,24 @@ class SubmissionDeduplicator:
         client = self._clients.get(draft.submitter)
         if client is None:
             return None
-        same = client.packets.get(draft.marks.packet)
+        same = client.last.get(_packet(draft))
         if same is not None and now - same.at <= SAME_PACKET:
             return Known(same.task_id, Rule.SAME_PACKET)
-        last = client.of_command.get((draft.vehicle, draft.command))
+        last = client.last.get(_command(draft))
         if last is not None and last.draft.marks.payload == draft.marks.payload:
             if confirmation > 0 and now - last.at <= CONFIRMED:
                 return Known(last.task_id, Rule.CONFIRMED)
             if now - last.at <= SAME_PAYLOAD:
                 last.at = now
                 return last.repeated(Rule.SAME_PAYLOAD)
-        goal = client.goals.get(draft.vehicle)
+        goal = client.last.get(_goal(draft.vehicle))
         if (
             goal is not None
             and now - goal.at <= SAME_GOAL
             and _same_place(goal.draft, draft, origin)
         ):
             # copies of this command may follow
-            copy = _Last(goal.task_id, draft, now, is_told=True)
-            client.of_command[draft.vehicle, draft.command] = copy
+            client.last[_command(draft)] = _Last(goal.task_id, draft, now, is_told=True)
             return goal.repeated(Rule.SAME_GOAL)
         return None
 
@@ -142,8 +136,9 @@ class SubmissionDeduplicator:
             self._nonces[_key(submitter, marks.nonce)] = task.id
             if len(self._nonces) > SPARE:
                 self._forget_nonces()
-        if now - at > LONGEST:
-            return
+        is_place = isinstance(task.goal, GoTo)
+        if now - at > LONGEST or (marks.nonce and not is_place):
+            return  # its nonce alone identifies it
         client = self._clients.get(submitter)
         if client is None:
             if len(self._clients) >= MANY_CLIENTS:
@@ -151,18 +146,13 @@ class SubmissionDeduplicator:
             client = _Client()
             keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
         client.at = at
-        if marks.nonce and not isinstance(task.goal, GoTo):
-            return  # its nonce alone identifies it
-        vehicle = task.submitted_to
-        draft = Draft(vehicle, task.command, task.goal, submitter, task.terms, marks)
+        draft = Draft(task.submitted_to, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
-        if isinstance(task.goal, GoTo):
-            client.goals[vehicle] = last
-        if marks.nonce:
-            return
-        client.of_command[vehicle, task.command] = last
-        if marks.packet:
-            keep_latest(client.packets, marks.packet, last, most=PACKETS)
+        found = [_goal(draft.vehicle)] if is_place else []
+        if not marks.nonce:
+            found += [_command(draft), _packet(draft)] if marks.packet else [_command(draft)]
+        for mark in found:
+            keep_latest(client.last, mark, last, most=RECENT)
 
     def held(self, submitter: Submitter, vehicle: int) -> None:
         """Forget a client's last return after its halt: the next return is new (rule 4).
@@ -170,49 +160,38 @@ class SubmissionDeduplicator:
         A go-to is not forgotten: other messages for the same go-to may still be on their way.
         """
         client = self._clients.get(submitter)
-        goal = None if client is None else client.goals.get(vehicle)
+        goal = None if client is None else client.last.get(_goal(vehicle))
         if client is not None and goal is not None and goal.draft.goal == GoTo(None):
-            del client.goals[vehicle]
+            del client.last[_goal(vehicle)]
 
     def forget(self, task: Task) -> None:
         """Forget a submission that was refused after all, so that the client may try it again."""
         if task.marks.nonce:
             self._nonces.pop(_key(task.submitter, task.marks.nonce), None)
-        client = self._clients.get(task.submitter)
-        if client is None:
-            return
-        vehicle = task.submitted_to
-        last = client.of_command.get((vehicle, task.command))
-        if last is not None and last.task_id == task.id:
-            del client.of_command[vehicle, task.command]
-        goal = client.goals.get(vehicle)
-        if goal is not None and goal.task_id == task.id:
-            del client.goals[vehicle]
-        client.packets.pop(task.marks.packet, None)
+        if client := self._clients.get(task.submitter):
+            kept = {mark: each for mark, each in client.last.items() if each.task_id != task.id}
+            client.last = kept
 
     def forget_vehicle(self, vehicle: int, tasks: Container[TaskId]) -> None:
         """Forget a vehicle with its ``tasks``: the next gateway that has it knows them."""
         self._nonces = {key: each for key, each in self._nonces.items() if each not in tasks}
         for client in self._clients.values():
-            for place, goal in tuple(client.goals.items()):
-                if place == vehicle or goal.task_id in tasks:  # submitted to any vehicle
-                    del client.goals[place]
-            for key, last in tuple(client.of_command.items()):
-                if key[0] == vehicle or last.task_id in tasks:
-                    del client.of_command[key]
-            packets = client.packets.items()
-            client.packets = {key: last for key, last in packets if last.task_id not in tasks}
+            client.last = {
+                mark: each
+                for mark, each in client.last.items()
+                if each.draft.vehicle != vehicle and each.task_id not in tasks
+            }
 
     def _by_nonce(self, draft: Draft, *, now: float) -> Known | None:
         key = _key(draft.submitter, draft.marks.nonce)
         task_id = self._nonces.get(key)
         task = None if task_id is None else self._registry.get(task_id)
-        if task_id is None or task is None or _is_long_over(task, now=now):
+        if task is None or _is_long_over(task, now=now):
             self._nonces.pop(key, None)
             return None
         if task.marks.payload != draft.marks.payload:
             raise reused(draft.marks.nonce)
-        return Known(task_id, Rule.NONCE)
+        return Known(task.id, Rule.NONCE)
 
     def _forget_nonces(self) -> None:
         if len(self._nonces) > 2 * len(self._registry) + SPARE:  # most are of forgotten tasks
@@ -240,24 +219,29 @@ def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
     return submitter.fingerprint, submitter.system_id, submitter.component_id, nonce
 
 
+def _packet(draft: Draft) -> _Mark:
+    return draft.marks.packet, -1, -1
+
+
+def _command(draft: Draft) -> _Mark:
+    return "", draft.vehicle, draft.command
+
+
+def _goal(vehicle: int) -> _Mark:
+    return "goal", vehicle, 0
+
+
 def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:
     if not isinstance(one.goal, GoTo) or not isinstance(other.goal, GoTo):
         return False
     if (one.goal.yaw, one.goal.wait) != (other.goal.yaw, other.goal.wait):
         return False  # they do different things there
-    places = one.goal.place, other.goal.place
-    if None in places:
-        return places == (None, None)
-    if origin is None and LocalPlace in map(type, places) and GlobalPlace in map(type, places):
+    first, second = one.goal.place, other.goal.place
+    if first is None or second is None:
+        return first is second
+    if origin is None and isinstance(first, GlobalPlace) and isinstance(second, GlobalPlace):
+        origin = first
+    here, there = local_place(first, origin), local_place(second, origin)
+    if here is None or there is None:
         return False
-    first = _local(places[0], origin or places[0])
-    second = _local(places[1], origin or places[0])
-    return hypot(first.north - second.north, first.east - second.east) <= NEAR
-
-
-def _local(place: Place | None, origin: Place | None) -> LocalPlace:
-    if isinstance(place, GlobalPlace):
-        assert isinstance(origin, GlobalPlace), "a global place is compared in a known frame"
-        return to_local(place, origin)
-    assert isinstance(place, LocalPlace)
-    return place
+    return hypot(here.north - there.north, here.east - there.east) <= NEAR

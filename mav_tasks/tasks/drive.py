@@ -1,11 +1,10 @@
 """Drives the active task of a vehicle while it is EXECUTING: path, arrival, fence, faults.
 
-It never changes the task's state: it returns the outcome, which the executor records.
+It never changes the task's state: it raises ``Becomes``, which the executor records.
 """
 
 from dataclasses import replace
 from math import copysign, inf, isnan
-from typing import NamedTuple
 
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
@@ -47,11 +46,12 @@ KEEP_EACH = 1.0  # s between two writes of a driven task's progress
 SHARE_EACH = 0.5  # s between two estimates of how much of it is done; of a long plan they cost
 
 
-class Becomes(NamedTuple):
-    """Outcome for the driven task: its next state, and why."""
+class Becomes(Exception):
+    """The driven task is over or interrupted: its next state, and why."""
 
-    state: TaskState
-    reason: TaskReason = R.NONE
+    def __init__(self, state: TaskState, reason: TaskReason = R.NONE) -> None:
+        super().__init__(state, reason)
+        self.state, self.reason = state, reason
 
 
 class Drive:
@@ -63,7 +63,7 @@ class Drive:
         self._registry = registry
         self._times = times
         self._bounds = bounds
-        self._settings = settings
+        self.settings = settings
         #: m/s, speed of tasks that are ``is_cruising``; None: the settings' speed
         self.cruise: float | None = None
         self._course: PathFollower | None = None
@@ -82,9 +82,6 @@ class Drive:
 
     def __repr__(self) -> str:
         return f"Drive({self._course!r}, {self._last_velocity})"
-
-    def apply(self, settings: Settings) -> None:
-        self._settings = settings
 
     def forget(self) -> None:
         """Drop the path of the active task: another task, or step, takes its place."""
@@ -105,37 +102,36 @@ class Drive:
             self._last_velocity = ZERO
             return demand
         self._last_velocity = limited(
-            demand.velocity, self._last_velocity, driving=self._settings.driving, elapsed=elapsed
+            demand.velocity, self._last_velocity, driving=self.settings.driving, elapsed=elapsed
         )
         if not self._last_velocity.is_zero:
             self._moved_at = now
         self._astray.commanded(self._last_velocity)
-        self._stuck.commanded(self._last_velocity, seconds=self._settings.watch.setpoint_period)
+        self._stuck.commanded(self._last_velocity, seconds=self.settings.watch.setpoint_period)
         return Demand(DemandKind.DRIVE, self._last_velocity)
 
-    def begin(
-        self, task: Task, seen: VehicleView, motion: Motion, *, now: float
-    ) -> Progress | Becomes:
+    def begin(self, task: Task, seen: VehicleView, motion: Motion, *, now: float) -> Progress:
         """Plan the path of a task that starts or resumes where the vehicle stands."""
         self._driven = task.progress.driven
         self._way_back = None
         here = self._set_out(task, task.progress, seen, motion, now=now)
-        if isinstance(here, Becomes) or self._course is None:
+        if self._course is None:
             return here
-        self._way_back, self._astray = None, AstrayWatch()
+        self._astray = AstrayWatch()
         if task.progress.anchor is not None:
+            single = present_goal(task.goal, here)
             self._way_back = recovery_path(
-                present_goal(task.goal, here),
+                single,
                 here,
                 motion,
                 honours_yaw_rate=seen.honours_yaw_rate,
-                steering=steering_of(present_goal(task.goal, here), seen, self._bounds),
+                steering=steering_of(single, seen, self._bounds),
             )
         return here
 
     def _set_out(
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
-    ) -> Progress | Becomes:
+    ) -> Progress:
         """Plan the path of a stage that begins here, if it can begin; without one, it waits."""
         single = present_goal(task.goal, progress)
         if isinstance(single, GoTo) and single.place is None:
@@ -145,27 +141,28 @@ class Drive:
                 return progress
         steering = steering_of(single, seen, self._bounds)
         if steering is not None and isinstance(single, Rotate | Face | MoveTurned):
-            return Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
+            raise Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
         here = set_out(task.goal, progress, seen, motion, steering=steering)
         if here is None:
-            return Becomes(S.PAUSED, R.POSITION_LOST)
+            raise Becomes(S.PAUSED, R.POSITION_LOST)
         if isinstance(single, Wait):
             utc = now + self._times.wall_offset
             here = replace(here, done=waited(single, here.done, utc=utc))
-        longest = self._settings.driving.max_distance
+        longest = self.settings.driving.max_distance
         if here.target is not None and distance(motion.pose, here.target) > longest:
-            return Becomes(S.FAILED, R.BAD_PARAMETER)
+            raise Becomes(S.FAILED, R.BAD_PARAMETER)
         if task.terms.max_distance is not None:
             left = time_left(task.goal, here, self._known(task, seen, motion))
-            if end := self._end_of_way(task, left.metres, now=now):
-                return end
+            self._check_way(task, left.metres, now=now)
         metres = self._bounds.metres_to_leave(single, here, motion.pose, seen.origin)
         if metres is not None:
             words = f"would leave the fence in task {task.id} after {metres:.1f} m"
             self._note(task, words, now=now)
-            return _refused(task)
+            if task.progress.anchor is None and task.progress.step < 0:  # none of it is driven
+                raise Becomes(S.FAILED, R.OUTSIDE_FENCE)
+            raise Becomes(S.HELD, R.FENCE)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
-        driving = self._settings.driving
+        driving = self.settings.driving
         self._course = course_of(task.goal, here, seen, driving=driving, steering=steering)
         self._begin_leg(now=now)
         return here
@@ -186,14 +183,14 @@ class Drive:
                 return progress, True
         return progress, seen.is_home_old
 
-    def _end_of_way(self, task: Task, left: float, *, now: float) -> Becomes | None:
-        """Return the end of a task that drives farther than its submitter may, and say so."""
+    def _check_way(self, task: Task, left: float, *, now: float) -> None:
+        """End a task that drives farther than its submitter may, and say so."""
         most, way = task.terms.max_distance, self._driven + left
         if most is None or way <= most * CORRECTIONS + SLACK:
-            return None
+            return
         long = "unknown" if isnan(way) else f"{way:.1f} m"
         self._note(task, f"task {task.id} may drive {most:g} m: its way is {long}", now=now)
-        return Becomes(S.FAILED, R.NOT_ALLOWED)
+        raise Becomes(S.FAILED, R.NOT_ALLOWED)
 
     def go_on(
         self,
@@ -204,11 +201,10 @@ class Drive:
         executed: float,
         elapsed: float,
         now: float,
-    ) -> Demand | Becomes:
-        """Return this tick's demand, or the outcome; ``executed`` is the s of EXECUTING so far."""
+    ) -> Demand:
+        """Return this tick's demand; ``executed`` is the s of EXECUTING so far."""
         self._driven += abs(self._last_velocity.forward) * elapsed
-        if end := self._end_of_way(task, 0.0, now=now):
-            return end
+        self._check_way(task, 0.0, now=now)
         if self._course is None:  # another step of a plan begins
             single = present_goal(task.goal, task.progress)
             steering = steering_of(single, seen, self._bounds)
@@ -226,21 +222,18 @@ class Drive:
         if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
             self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
             if course.has_passed(motion):
-                after = self._leave_step(task, task.goal, now=now)
-                if isinstance(after, Becomes):
-                    return after
-                self._registry.note_progress(task.id, after)
+                self._registry.note_progress(task.id, self._leave_step(task, task.goal, now=now))
                 self._course = None
                 return Demand(DemandKind.DRIVE, self._last_velocity)
         self._note_progress(task, seen, motion, executed=executed, now=now)
         # zeros were commanded for long enough to call slowness a standstill
-        stands = seen.still and now - self._moved_at >= self._settings.watch.still_time
+        stands = seen.still and now - self._moved_at >= self.settings.watch.still_time
         if self._arrival.stands_here(
             course,
             motion,
             self._last_velocity,
             stands=stands,
-            driving=self._settings.driving,
+            driving=self.settings.driving,
             now=now,
         ):
             if not stands and not isinstance(course.leg, Wait):
@@ -249,25 +242,22 @@ class Drive:
         if is_held_back:
             self._stuck.begin(now=now)
             return view.STAND
-        if self._stuck.is_stuck(course, seen, limit=self._settings.watch.stuck, now=now):
-            return Becomes(S.FAILED, R.STUCK)
-        period = self._settings.watch.setpoint_period
+        if self._stuck.is_stuck(course, seen, limit=self.settings.watch.stuck, now=now):
+            raise Becomes(S.FAILED, R.STUCK)
+        period = self.settings.watch.setpoint_period
         news = self._follows.look(self._last_velocity, motion, seconds=period, now=now)
         if news:
             self._note(task, news, now=now)
         if self._astray.is_astray(course, motion):
             self._note(task, "does not follow its setpoints: check its heading", now=now)
-            return Becomes(S.HELD, R.OFF_TRACK)
+            raise Becomes(S.HELD, R.OFF_TRACK)
         speed = None if course is self._way_back else course.progress.speed
         driving, slowest = self._driving_of(task), self._arrival.slowest(course)
         wish = course.steer(motion, driving=driving, speed=speed, slowest=slowest)
         top = task.terms.top_speed
         if top is not None and abs(wish.forward) > top:
             wish = replace(wish, forward=copysign(top, wish.forward))
-        velocity = self._within_fence(course, wish, motion, seen, now=now)
-        if velocity is None:
-            return Becomes(S.HELD, R.FENCE)
-        return Demand(DemandKind.DRIVE, velocity)
+        return Demand(DemandKind.DRIVE, self._within_fence(course, wish, motion, seen, now=now))
 
     def _note(self, task: Task, words: str, *, now: float) -> None:
         """Report a text about the vehicle of a task."""
@@ -275,7 +265,7 @@ class Drive:
 
     def _driving_of(self, task: Task) -> Driving:
         """Return the settings for a task; a task that is cruising has the vehicle's own speed."""
-        driving = self._settings.driving
+        driving = self.settings.driving
         if self.cruise is None or not task.terms.is_cruising:
             return driving
         return replace(driving, speed=min(self.cruise, driving.max_speed))
@@ -288,33 +278,34 @@ class Drive:
 
     def _within_fence(
         self, course: PathFollower, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
-    ) -> Velocity | None:
-        """Return the velocity slowed before the fence; None: stop. Outside, let it drive in."""
+    ) -> Velocity:
+        """Return the velocity slowed before the fence. Outside, let it drive in."""
         if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
             self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
             if self._is_coming_back:
                 return wish
         fence = self._bounds.local(seen.origin)
-        return within_fence(wish, motion, fence, driving=self._settings.driving, now=now)
+        velocity = within_fence(wish, motion, fence, driving=self.settings.driving, now=now)
+        if velocity is None:
+            raise Becomes(S.HELD, R.FENCE)
+        return velocity
 
     def _arrive(
         self, task: Task, course: PathFollower, seen: VehicleView, motion: Motion, now: float
-    ) -> Demand | Becomes | None:
+    ) -> Demand | None:
         """End a leg: begin the next leg or step, leave the recovery path, or complete the task."""
         self._begin_leg(now=now)
         if course.advance(motion):
             if (course.by_course or course.steering) and course.misses > MISSES:
-                return Becomes(S.FAILED, R.STUCK)
+                raise Becomes(S.FAILED, R.STUCK)
             if course is self._course:
                 self._registry.advance(task.id, course.progress, now=now)
         elif course is self._way_back:
             self._way_back = None
         elif not isinstance(task.goal, Plan):
-            return Becomes(S.COMPLETED)
+            raise Becomes(S.COMPLETED)
         elif not (is_over(task.goal, course.progress) and course.progress.pending):
             after = self._leave_step(task, task.goal, now=now)
-            if isinstance(after, Becomes):
-                return after
             return self._go_on(task, after, seen, motion, now=now)
         return None
 
@@ -342,24 +333,24 @@ class Drive:
         if looked.done:
             self._registry.advance(task.id, looked.progress, now=now)
 
-    def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
-        """End the current step. Return the progress of the next one, or COMPLETED."""
+    def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress:
+        """End the current step. Return the progress of the next one, if there is one."""
         assert self._course is not None, "a step is driven on its course"
         progress = self._course.progress
         if not is_over(plan, progress):
             self._registry.reached(task.id, progress.step, performs=False, now=now)
         left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
         after = following(plan, replace(progress, pending=left))  # unmet Near conditions lapse
-        return Becomes(S.COMPLETED) if after is None else after
+        if after is None:
+            raise Becomes(S.COMPLETED)
+        return after
 
     def _go_on(
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
-    ) -> Demand | Becomes | None:
+    ) -> Demand | None:
         """Begin the next step where the vehicle is, moving or not. Return why not, or None."""
         self._registry.note_progress(task.id, progress)  # in any case the last step is done
         here = self._set_out(task, progress, seen, motion, now=now)
-        if isinstance(here, Becomes):
-            return here
         if self._course is None:
             self._registry.note_progress(task.id, here)
             return view.STAND
@@ -395,10 +386,3 @@ class Drive:
             return
         course.look(motion, elapsed=0.0)
         self._registry.advance(task.id, course.progress, now=now)
-
-
-def _refused(task: Task) -> Becomes:
-    """Return the outcome of a way that crosses the fence; none of it is driven."""
-    if task.progress.anchor is None and task.progress.step < 0:
-        return Becomes(S.FAILED, R.OUTSIDE_FENCE)
-    return Becomes(S.HELD, R.FENCE)

@@ -11,7 +11,6 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.drive import Becomes, Drive
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.driving.recovery_path import is_off_line, was_handled
 from mav_tasks.tasks.events import SERVER, TaskWaits
@@ -90,8 +89,7 @@ class Executor:
             self._meter.note(now=now)
 
     def apply(self, settings: Settings) -> None:
-        self._settings = settings
-        self.drive.apply(settings)
+        self._settings = self.drive.settings = settings
 
     # requests
 
@@ -225,7 +223,13 @@ class Executor:
     def _step(self, task: Task, seen: VehicleView, elapsed: float, *, now: float) -> Demand:
         match task.state:
             case S.STARTING | S.EXECUTING:
-                return self._run(task, seen, elapsed, now=now)
+                try:
+                    return self._run(task, seen, elapsed, now=now)
+                except Becomes as outcome:
+                    if outcome.state is S.PAUSED:
+                        self.pause(outcome.reason, actor=SERVER, now=now)
+                    else:
+                        self._change(outcome.state, outcome.reason, now=now)
             case S.PAUSED if self._loss is not None:
                 self._wait_for_return(task, self._loss, seen, now=now)
             case S.CANCELLING if seen.still:
@@ -265,10 +269,10 @@ class Executor:
         if is_waited_for and seen.refusal and seen.is_not_ready:
             return self._wait_until_ready(task, seen.why_not_ready, now=now)
         if is_starting and (why := seen.refusal or (R.LOSS_FAILSAFE if seen.drives_on else R.NONE)):
-            return self._becomes(Becomes(S.FAILED, why), now=now)
+            raise Becomes(S.FAILED, why)
         taking, start_timeout = now - self._taking_since, self._settings.watch.start_timeout
         if not seen.in_control and taking > start_timeout:
-            return self._becomes(Becomes(S.FAILED, R.START_TIMEOUT), now=now)
+            raise Becomes(S.FAILED, R.START_TIMEOUT)
         if not seen.in_control:
             return view.TAKE
         if not is_starting:
@@ -281,12 +285,13 @@ class Executor:
             if not seen.still and not creeps:  # the start heading must be measured at rest
                 # not since it began to start: it may have waited until it was ready to arm
                 if taking > 2 * start_timeout:
-                    return self._becomes(Becomes(S.FAILED, R.START_TIMEOUT), now=now)
+                    raise Becomes(S.FAILED, R.START_TIMEOUT)
                 return view.STAND
-            return self._set_out(task, seen, motion, now=now)
+            progress = self.drive.begin(task, seen, motion, now=now)
+            self._change(S.EXECUTING, now=now, progress=progress)
+            return view.STAND
         executed = self._executed_before + now - self._since
-        outcome = self.drive.go_on(task, seen, motion, executed=executed, elapsed=elapsed, now=now)
-        return self._becomes(outcome, now=now) if isinstance(outcome, Becomes) else outcome
+        return self.drive.go_on(task, seen, motion, executed=executed, elapsed=elapsed, now=now)
 
     def _waits_to_take(self, task: Task, seen: VehicleView, *, now: float) -> bool:
         """Return whether a STARTING task waits: it is not ready, or in somebody's mode."""
@@ -295,21 +300,6 @@ class Executor:
             self._taking_since = now
             return True
         return blocker is R.WRONG_MODE  # it resumes out of that mode
-
-    def _set_out(self, task: Task, seen: VehicleView, motion: Motion, *, now: float) -> Demand:
-        progress = self.drive.begin(task, seen, motion, now=now)
-        if isinstance(progress, Becomes):
-            return self._becomes(progress, now=now)
-        self._change(S.EXECUTING, now=now, progress=progress)
-        return view.STAND
-
-    def _becomes(self, outcome: Becomes, *, now: float) -> Demand:
-        """Apply an outcome to the task. Return HOLD."""
-        if outcome.state is S.PAUSED:
-            self.pause(outcome.reason, actor=SERVER, now=now)
-        else:
-            self._change(*outcome, now=now)
-        return view.HOLD
 
     def _wait_until_ready(self, task: Task, words: str, *, now: float) -> Demand:
         """Wait after a refused arming; return TAKE when it is time for another attempt."""
@@ -347,8 +337,8 @@ class Executor:
             return
         if now - self._since > watch.lost_timeout:
             # taken over, and silent, or not as it was left: the gateway before may have ended it
-            unknown = Becomes(S.HELD, R.OUTCOME_UNKNOWN)
-            lost = unknown if loss.is_taken_over else Becomes(S.FAILED, R.LINK_TIMEOUT)
+            unknown = S.HELD, R.OUTCOME_UNKNOWN
+            lost = unknown if loss.is_taken_over else (S.FAILED, R.LINK_TIMEOUT)
             self._change(*lost, now=now)
             return
         loss.was_silent |= not seen.heard
