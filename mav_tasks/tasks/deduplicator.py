@@ -210,8 +210,7 @@ def reused(nonce: int) -> Rejection:
 
 def _is_long_over(task: Task, *, now: float) -> bool:
     """Return whether the nonce of a finished task may be used for a new submission."""
-    ended_at = task.submitted_at if task.changed_at is None else task.changed_at
-    return task.state in TERMINAL and now - ended_at > NONCE_KEPT
+    return task.state in TERMINAL and now - task.ended_at > NONCE_KEPT
 
 
 def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:

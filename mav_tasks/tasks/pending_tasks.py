@@ -216,19 +216,23 @@ class PendingTasks:
 
     def handle_deadline(self, *, now: float) -> None:
         """Expire tasks whose deadline has passed, and settle those whose start time has come."""
-        for task_id in self.times.deadlines.take(now=now):
-            if task_id in self._waiters:
-                task = self._registry[task_id]
+        due = [self._registry[task_id] for task_id in self.times.take(now=now)]
+        late = [task for task in due if self.times.is_too_late(task, now=now)]
+        for task in late:
+            if task.id in self._waiters:
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
-        for task_id in self.times.starts.take(now=now):
-            self._settle(self._registry[task_id], now=now)
+        for task in due:
+            if task.id in self._waiters:
+                self.times.started(task)
+                self._settle(self._registry[task.id], now=now)
 
     def set_wall_offset(self, offset: float, *, now: float) -> None:
         """Set UTC minus monotonic time, s; this moves the tasks that start at a UTC time."""
         waiting = [self._registry[task_id] for task_id in self._waiters]
         is_corrected = self.times.wall_offset - offset > CORRECTION
         self.times.wall_offset = offset
-        self.times.note(*waiting)
+        for task in waiting:
+            self.times.note(task)
         if is_corrected:
             waiting = [self._brought_forward(task, now=now) for task in waiting]
         for task in waiting:

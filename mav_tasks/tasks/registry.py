@@ -4,7 +4,7 @@ All changes of tasks go through the registry, so that the journal and the tasks 
 Events are numbered from 1. The store reports the number up to which they are durable.
 """
 
-from collections import Counter, defaultdict, deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
@@ -85,22 +85,16 @@ class TaskRegistry:
         counts = self._counts.get(vehicle)
         return 0 if counts is None else sum(map(counts.__getitem__, WAITING))
 
-    def restore(self, tasks: Sequence[Task], *, next_id: int = 0) -> None:
-        """Load the tasks of an earlier run, all of them durable; ``next_id`` 0: as before."""
-        if next_id:
-            self.ids.count_from(next_id)
+    def restore(self, tasks: Sequence[Task]) -> None:
+        """Load the tasks of an earlier run, all of them durable."""
         self._tasks.update((task.id, task) for task in tasks)
         self._last_event.update((task.id, 0) for task in tasks)
-        counts = Counter((task.vehicle, task.state) for task in tasks)
-        for (vehicle, state), count in counts.items():
-            self._counts[vehicle][state] += count
         over = [task for task in tasks if task.state in TERMINAL]
-        over.sort(
-            key=lambda task: task.submitted_at if task.changed_at is None else task.changed_at
-        )
+        over.sort(key=lambda task: task.ended_at)
         self._finished.extend(task.id for task in over)
         newest: dict[int, Task] = {}  # by series
         for task in tasks:
+            self._counts[task.vehicle][task.state] += 1
             if task.state not in TERMINAL:
                 self._note_live(task)
             if task.terms.series:

@@ -27,10 +27,9 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSeen,
 )
-from mav_tasks.tasks.forecast import Forecast, known_of
+from mav_tasks.tasks.forecast import Forecast, estimate, known_of, position, wait_reason
 from mav_tasks.tasks.goal import Goal, GoTo, Move, Plan, Rotate, describe
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, words_of
-from mav_tasks.tasks.outlook import estimate, position, wait_reason
 from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
