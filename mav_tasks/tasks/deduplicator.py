@@ -69,8 +69,9 @@ class _Last:
         return Known(self.task_id, rule, is_news)
 
 
-#: under which a submission is remembered: a packet, or a place, or a command, to a vehicle or ANY
-_Mark = tuple[str, int, int]
+#: under which a submission is remembered: a packet, or the vehicle (or ANY) that was to go to a
+#: place, or that vehicle and a command
+_Mark = str | int | tuple[int, int]
 
 
 @dataclass(slots=True)
@@ -108,24 +109,25 @@ class SubmissionDeduplicator:
         client = self._clients.get(draft.submitter)
         if client is None:
             return None
-        same = client.last.get(_packet(draft))
+        same = client.last.get(draft.marks.packet)
         if same is not None and now - same.at <= SAME_PACKET:
             return Known(same.task_id, Rule.SAME_PACKET)
-        last = client.last.get(_command(draft))
+        last = client.last.get((draft.vehicle, draft.command))
         if last is not None and last.draft.marks.payload == draft.marks.payload:
             if confirmation > 0 and now - last.at <= CONFIRMED:
                 return Known(last.task_id, Rule.CONFIRMED)
             if now - last.at <= SAME_PAYLOAD:
                 last.at = now
                 return last.repeated(Rule.SAME_PAYLOAD)
-        goal = client.last.get(_goal(draft.vehicle))
+        goal = client.last.get(draft.vehicle)
         if (
             goal is not None
             and now - goal.at <= SAME_GOAL
             and _same_place(goal.draft, draft, origin)
         ):
             # copies of this command may follow
-            client.last[_command(draft)] = _Last(goal.task_id, draft, now, is_told=True)
+            copy = _Last(goal.task_id, draft, now, is_told=True)
+            client.last[draft.vehicle, draft.command] = copy
             return goal.repeated(Rule.SAME_GOAL)
         return None
 
@@ -146,13 +148,15 @@ class SubmissionDeduplicator:
             client = _Client()
             keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
         client.at = at
-        draft = Draft(task.submitted_to, task.command, task.goal, submitter, task.terms, marks)
+        vehicle = task.submitted_to
+        draft = Draft(vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
-        found = [_goal(draft.vehicle)] if is_place else []
+        if is_place:
+            keep_latest(client.last, vehicle, last, most=RECENT)
         if not marks.nonce:
-            found += [_command(draft), _packet(draft)] if marks.packet else [_command(draft)]
-        for mark in found:
-            keep_latest(client.last, mark, last, most=RECENT)
+            keep_latest(client.last, (vehicle, task.command), last, most=RECENT)
+        if marks.packet and not marks.nonce:
+            keep_latest(client.last, marks.packet, last, most=RECENT)
 
     def held(self, submitter: Submitter, vehicle: int) -> None:
         """Forget a client's last return after its halt: the next return is new (rule 4).
@@ -160,9 +164,9 @@ class SubmissionDeduplicator:
         A go-to is not forgotten: other messages for the same go-to may still be on their way.
         """
         client = self._clients.get(submitter)
-        goal = None if client is None else client.last.get(_goal(vehicle))
+        goal = None if client is None else client.last.get(vehicle)
         if client is not None and goal is not None and goal.draft.goal == GoTo(None):
-            del client.last[_goal(vehicle)]
+            del client.last[vehicle]
 
     def forget(self, task: Task) -> None:
         """Forget a submission that was refused after all, so that the client may try it again."""
@@ -216,18 +220,6 @@ def _is_long_over(task: Task, *, now: float) -> bool:
 def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
     """Return a key without the endpoint: a client may come back from another one."""
     return submitter.fingerprint, submitter.system_id, submitter.component_id, nonce
-
-
-def _packet(draft: Draft) -> _Mark:
-    return draft.marks.packet, -1, -1
-
-
-def _command(draft: Draft) -> _Mark:
-    return "", draft.vehicle, draft.command
-
-
-def _goal(vehicle: int) -> _Mark:
-    return "goal", vehicle, 0
 
 
 def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:

@@ -4,13 +4,14 @@ A task is the result of its events. ``at`` is in monotonic seconds; the store an
 wall-clock time. ``actor`` is a client, or "server".
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+from mav_tasks.tasks.cron import utc_text
 from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-from mav_tasks.tasks.server_events import ParameterSet, SignatureRefused, SignaturesSeen
+from mav_tasks.tasks.repetition import repeat_words
 from mav_tasks.tasks.task import Frame, Progress, Task, TaskId, Terms
-from mav_tasks.tasks.term_changes import changes_of
 from mav_tasks.tasks.timing import Timing
 
 SERVER = "server"
@@ -390,6 +391,70 @@ class ServerStopped:
         return f"server stopped, HOLD and standstill not confirmed: check {rovers} {names}"
 
 
+@dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """A client changed a setting, in the unit of its parameter; None: as configured."""
+
+    name: str
+    value: float | None
+    actor: str
+    at: float
+
+    def __str__(self) -> str:
+        value = "as configured" if self.value is None else f"{self.value:g}"
+        return f"parameter {self.name}: {value}, by {self.actor}"
+
+
+@dataclass(frozen=True, slots=True)
+class SignatureTime:
+    """Timestamp of the last signed packet accepted from one sender, in 10 µs since 2015.
+
+    ``key`` is the fingerprint of the signing key.
+    """
+
+    key: str
+    link_id: int
+    system_id: int
+    component_id: int
+    timestamp: int
+
+
+@dataclass(frozen=True, slots=True)
+class SignaturesSeen:
+    """The last accepted signature timestamps, stored so that no packet is accepted twice.
+
+    ``gone`` are senders that the server has forgotten. ``signed_until``: no signature of our own is
+    later than this. The store keeps these events, but not in the journal: there are too many.
+    """
+
+    times: tuple[SignatureTime, ...]
+    gone: tuple[SignatureTime, ...]
+    signed_until: int
+    at: float
+
+    def __str__(self) -> str:
+        return f"signatures: {len(self.times)} senders heard"
+
+
+@dataclass(frozen=True, slots=True)
+class SignatureRefused:
+    """A packet with a valid signature was dropped because of its timestamp.
+
+    ``seconds`` is how long before the server's time it was signed; negative: after it.
+    """
+
+    actor: str
+    seconds: float
+    at: float
+
+    def __str__(self) -> str:
+        when = f"{abs(self.seconds):.0f} s {'before' if self.seconds > 0 else 'after'}"
+        return (
+            f"packet of {self.actor} refused: signed {when} this server's time. Check both clocks;"
+            " if they are right, the packet was delayed or replayed"
+        )
+
+
 Event = (
     TaskSubmitted
     | TaskChanged
@@ -416,3 +481,55 @@ Event = (
     | VehicleNoted
     | ServerStopped
 )
+
+
+def changes_of(before: Terms, after: Terms, *, at: float) -> str:
+    """Return the changed terms as text; "" if none changed.
+
+    ``at``: time of the change, on the same clock as the start time and the deadline.
+    """
+    return ", ".join(_changes(before, after, at))
+
+
+def _changes(before: Terms, after: Terms, at: float) -> Iterator[str]:
+    if after.priority != before.priority:
+        yield f"priority {after.priority} (was {before.priority})"
+    if after.place != before.place:
+        yield "another place in the queue"
+    if after.after != before.after:
+        yield f"runs after task {after.after}" if after.after else "runs after no other task"
+    if (after.start_at, after.start_utc) != (before.start_at, before.start_utc):
+        yield _start_of(after, at)
+    if (after.deadline, after.start_within) != (before.deadline, before.start_within):
+        yield _deadline_of(after, at)
+    if after.is_preemptible != before.is_preemptible:
+        yield "pre-emptible" if after.is_preemptible else "not pre-emptible"
+    if after.is_preemptive != before.is_preemptive:
+        yield "pre-emptive" if after.is_preemptive else "not pre-emptive"
+    if after.is_staged != before.is_staged:
+        yield "needs a start command" if after.is_staged else "start command received"
+    if after.repeat != before.repeat:
+        yield f"repeats: {repeat_words(after.repeat)}" if after.repeat else "does not repeat"
+    if after.label != before.label:
+        yield f"label '{after.label}'" if after.label else "no label"
+
+
+def _start_of(terms: Terms, at: float) -> str:
+    starts = []
+    if terms.start_at is not None:
+        starts.append(f"start in {_seconds(terms.start_at, at)}")
+    if terms.start_utc is not None:
+        starts.append(f"start at {utc_text(terms.start_utc)}")
+    return " and ".join(starts) or "no start time"
+
+
+def _deadline_of(terms: Terms, at: float) -> str:
+    if terms.start_within is not None:
+        return f"deadline {terms.start_within:g} s after its start time"
+    return (
+        "no deadline" if terms.deadline is None else f"deadline in {_seconds(terms.deadline, at)}"
+    )
+
+
+def _seconds(moment: float | None, at: float) -> str:
+    return f"{round((moment or 0.0) - at, 1):g} s"

@@ -75,7 +75,7 @@ class Executor:
     @property
     def task(self) -> Task | None:
         """The active task."""
-        return None if self.task_id is None else self._registry[self.task_id]
+        return None if self.task_id is None else self._registry.get(self.task_id)
 
     @property
     def timing(self) -> Timing | None:

@@ -109,7 +109,8 @@ class Lineup:
     @property
     def active(self) -> Task | None:
         """The task that has the vehicle: started, not over and not suspended."""
-        return self.executor.task
+        task_id = self.executor.task_id
+        return None if task_id is None else self.registry.get(task_id)
 
     @property
     def suspended(self) -> list[Task]:

@@ -21,8 +21,8 @@ from mav_tasks.services import file_transfer, param_receiver
 from mav_tasks.services.param_receiver import HASH_CHECK
 from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import ParameterSet
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.server_events import ParameterSet
 
 LIST_EACH = 0.2  # s between lists: one packet asks for many, no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet | m.FileTransferProtocol
