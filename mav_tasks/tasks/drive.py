@@ -28,7 +28,6 @@ from mav_tasks.tasks.driving.stage import (
     steering_of,
 )
 from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
-from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.goal import Face, GoTo, Move, MoveTurned, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
@@ -157,7 +156,7 @@ class Drive:
         metres = self._bounds.metres_to_leave(single, here, motion.pose, seen.origin)
         if metres is not None:
             words = f"would leave the fence in task {task.id} after {metres:.1f} m"
-            self._note(task, words, now=now)
+            self._registry.note(task.vehicle, words, now=now)
             if task.progress.anchor is None and task.progress.step < 0:  # none of it is driven
                 raise Becomes(S.FAILED, R.OUTSIDE_FENCE)
             raise Becomes(S.HELD, R.FENCE)
@@ -176,9 +175,8 @@ class Drive:
         if isinstance(task.goal, Plan):
             if progress.step < 0:
                 progress = started(task.goal, progress)
-            looked = look_on_the_way(task.goal, progress, to_place=inf, elapsed=0.0)
+            looked = self._look_on_the_way(task, progress, inf, elapsed=0.0, now=now)
             progress = looked.progress
-            self._note_done(task, looked, now=now)
             if looked.performed:
                 return progress, True
         return progress, seen.is_home_old
@@ -189,7 +187,9 @@ class Drive:
         if most is None or way <= most * CORRECTIONS + SLACK:
             return
         long = "unknown" if isnan(way) else f"{way:.1f} m"
-        self._note(task, f"task {task.id} may drive {most:g} m: its way is {long}", now=now)
+        self._registry.note(
+            task.vehicle, f"task {task.id} may drive {most:g} m: its way is {long}", now=now
+        )
         raise Becomes(S.FAILED, R.NOT_ALLOWED)
 
     def go_on(
@@ -220,7 +220,12 @@ class Drive:
         elapsed = 0.0 if is_held_back else elapsed
         course.look(motion, elapsed=elapsed)
         if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
-            self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
+            target = course.progress.target
+            to_place = None if target is None else distance(motion.pose, target)
+            if course.progress.pending:
+                course.progress = self._look_on_the_way(
+                    task, course.progress, to_place, elapsed=elapsed, now=now
+                ).progress
             if course.has_passed(motion):
                 self._registry.note_progress(task.id, self._leave_step(task, task.goal, now=now))
                 self._course = None
@@ -247,9 +252,11 @@ class Drive:
         period = self.settings.watch.setpoint_period
         news = self._follows.look(self._last_velocity, motion, seconds=period, now=now)
         if news:
-            self._note(task, news, now=now)
+            self._registry.note(task.vehicle, news, now=now)
         if self._astray.is_astray(course, motion):
-            self._note(task, "does not follow its setpoints: check its heading", now=now)
+            self._registry.note(
+                task.vehicle, "does not follow its setpoints: check its heading", now=now
+            )
             raise Becomes(S.HELD, R.OFF_TRACK)
         speed = None if course is self._way_back else course.progress.speed
         driving, slowest = self._driving_of(task), self._arrival.slowest(course)
@@ -258,10 +265,6 @@ class Drive:
         if top is not None and abs(wish.forward) > top:
             wish = replace(wish, forward=copysign(top, wish.forward))
         return Demand(DemandKind.DRIVE, self._within_fence(course, wish, motion, seen, now=now))
-
-    def _note(self, task: Task, words: str, *, now: float) -> None:
-        """Report a text about the vehicle of a task."""
-        self._registry.record(VehicleNoted(task.vehicle, words, now))
 
     def _driving_of(self, task: Task) -> Driving:
         """Return the settings for a task; a task that is cruising has the vehicle's own speed."""
@@ -310,28 +313,16 @@ class Drive:
         return None
 
     def _look_on_the_way(
-        self,
-        task: Task,
-        plan: Plan,
-        course: PathFollower,
-        motion: Motion,
-        *,
-        elapsed: float,
-        now: float,
-    ) -> None:
-        if not course.progress.pending:
-            return
-        target = course.progress.target
-        to_place = None if target is None else distance(motion.pose, target)
-        looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
-        course.progress = looked.progress
-        self._note_done(task, looked, now=now)
-
-    def _note_done(self, task: Task, looked: OnTheWay, *, now: float) -> None:
+        self, task: Task, progress: Progress, to_place: float | None, *, elapsed: float, now: float
+    ) -> OnTheWay:
+        """Do the steps of a plan that are due on the way, ``to_place`` m before its next place."""
+        assert isinstance(task.goal, Plan), "only plans have steps"
+        looked = look_on_the_way(task.goal, progress, to_place=to_place, elapsed=elapsed)
         for step in looked.done:
             self._registry.reached(task.id, step, performs=step in looked.performed, now=now)
         if looked.done:
             self._registry.advance(task.id, looked.progress, now=now)
+        return looked
 
     def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress:
         """End the current step. Return the progress of the next one, if there is one."""

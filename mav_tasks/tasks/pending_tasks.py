@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.cron import utc_text
-from mav_tasks.tasks.events import SERVER, VehicleNoted
+from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
 from mav_tasks.tasks.registry import TaskRegistry
@@ -286,7 +286,7 @@ class PendingTasks:
         run = None if why_not else next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
         if run is None:
             why_not = why_not or "it has no further time"
-            self._note(task, f"will not repeat task {task.id}: {why_not}", now=now)
+            self._registry.note(task.vehicle, f"will not repeat task {task.id}: {why_not}", now=now)
             return True
         terms = replace(run.terms, after=0, is_staged=False, place=None)
         draft = Draft(
@@ -299,7 +299,7 @@ class PendingTasks:
         if run.left_out:
             words = f"left out {left_out_words(run.left_out, terms.repeat)}"
             words += f" while task {task.id} waited or ran; task {added.id} is next"
-            self._note(task, words, now=now)
+            self._registry.note(task.vehicle, words, now=now)
         return True
 
     def _moved_on(self, task: Task, *, now: float) -> Task:
@@ -317,7 +317,7 @@ class PendingTasks:
         at = utc_text(self.times.start(task.terms) + self.times.wall_offset)
         words = f"left out {left_out_words(1 + run.left_out, run.terms.repeat)}"
         words += f" that passed meanwhile; task {task.id} starts {at}"
-        self._note(task, words, now=now)
+        self._registry.note(task.vehicle, words, now=now)
         return task
 
     def _brought_forward(self, task: Task, *, now: float) -> Task:
@@ -330,9 +330,6 @@ class PendingTasks:
         task = self._registry.modify(task.id, terms, actor=SERVER, now=now)
         self.times.note(task)
         return task
-
-    def _note(self, task: Task, words: str, *, now: float) -> None:
-        self._registry.record(VehicleNoted(task.vehicle, words, now))
 
     # removal
 

@@ -21,6 +21,7 @@ from mav_tasks.tasks.events import (
     TaskProgressed,
     TaskSubmitted,
     TaskWithdrawn,
+    VehicleNoted,
 )
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import (
@@ -326,6 +327,10 @@ class TaskRegistry:
         if vehicle := getattr(event, "vehicle", 0):
             self._last_of[vehicle] = self.recorded
         self._events.append(event)
+
+    def note(self, vehicle: int, words: str, *, now: float) -> None:
+        """Record something about a vehicle that its operator should read."""
+        self.record(VehicleNoted(vehicle, words, now))
 
     def is_durable(self, task_id: TaskId) -> bool:
         """Return whether the task's last submission, state change or modification is durable."""

@@ -19,7 +19,7 @@ from mav_tasks.tasks.driving.mission_sequencer import (
     skipped_to,
 )
 from mav_tasks.tasks.driving.recovery_path import is_off_line
-from mav_tasks.tasks.events import SERVER, QueueContinued, VehicleNoted
+from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import MoveTurned, Plan, Rotate
 from mav_tasks.tasks.halts import NOBODY, LastHalt
@@ -415,7 +415,7 @@ class VehicleTasks(Lineup):
         if why_not:
             self.last_released = None
             words = f"holds task {task.id} again: {why_not}. Release it again"
-            self.registry.record(VehicleNoted(self.vehicle, words, now))
+            self.registry.note(self.vehicle, words, now=now)
         elif waits_for is not release.waits_for:
             self._begin_released(task, release._replace(waits_for=waits_for), now=now)
 
