@@ -7,7 +7,6 @@ aging. It serves one answer to a client, and computes nothing until it is asked.
 
 from collections import Counter
 from collections.abc import Sequence
-from functools import cached_property
 from heapq import heapify, heappop, heappush
 from math import isnan, nan
 
@@ -36,6 +35,7 @@ class Forecast:
         self._registry = registry
         self._now = now
         self._known = known_of(tasks)
+        self._played: tuple[dict[TaskId, Times], Estimate] | None = None  # not computed yet
         self._ready: list[tuple[Rank, TaskId]] = []
         self._due: list[tuple[float, TaskId]] = []  # seconds from now
         self._dependents: dict[int, list[Task]] = {}
@@ -46,22 +46,26 @@ class Forecast:
 
     def of(self, task: Task) -> Times:
         """Return the seconds until a waiting task starts, and until it ends; NaN: not known."""
-        return self._played[0].get(task.id, (nan, nan))
+        return self._outcome()[0].get(task.id, (nan, nan))
 
     def when_empty(self) -> Estimate:
         """Return in how many seconds, and where, all tasks are over that need not wait for a time.
 
         UNKNOWN if nothing can run, or there are too many.
         """
-        return UNKNOWN if len(self._tasks.queue) > FEW else self._played[1]
+        return UNKNOWN if len(self._tasks.queue) > FEW else self._outcome()[1]
 
     def known_when_empty(self) -> Known:
         """Return from where a new task is driven: where those before it end, else from here."""
         return self._known._replace(pose=self.when_empty().pose or self._known.pose)
 
-    @cached_property
-    def _played(self) -> tuple[dict[TaskId, Times], Estimate]:
-        """All times, and when no task is ready for the first time."""
+    def _outcome(self) -> tuple[dict[TaskId, Times], Estimate]:
+        if self._played is None:
+            self._played = self._play()
+        return self._played
+
+    def _play(self) -> tuple[dict[TaskId, Times], Estimate]:
+        """Return all times, and when no task is ready for the first time."""
         times: dict[TaskId, Times] = {}
         self._line_up(times)
         clock, pose, _ = self._when_free()

@@ -12,6 +12,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.displacement import LedAway
+from mav_tasks.tasks.driving.jump import JumpWatch
 from mav_tasks.tasks.driving.limits import safe_braking
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.events import (
@@ -92,6 +93,9 @@ class Lineup:
         self.stopping_after_kill = False
         #: a held task that waits until the vehicle has rebooted, or the queue resumes
         self.last_released: Released | None = None
+        #: the vehicle at the last step
+        self.seen: VehicleView | None = None
+        self._jumps = JumpWatch()
         #: the unique id of the vehicle of these tasks, "" until it was heard
         self.uid = ""
         #: no person has disarmed it, or one has allowed arming since

@@ -141,7 +141,6 @@ class TaskRegistry:
     def restore(self, tasks: Sequence[Task]) -> None:
         """Load the tasks of an earlier run, all of them durable."""
         self._tasks.update((task.id, task) for task in tasks)
-        self._last_event.update((task.id, 0) for task in tasks)
         over = [task for task in tasks if task.state in TERMINAL]
         over.sort(key=lambda task: task.ended_at)
         self._finished.extend(task.id for task in over)
@@ -215,16 +214,16 @@ class TaskRegistry:
         counts[new] += 1
         self.record(
             TaskChanged(
-                task_id=task_id,
-                vehicle=task.vehicle,
-                version=task.version,
-                old=old.state,
-                new=new,
-                reason=reason,
-                actor=actor,
-                at=now,
-                progress=task.progress,
-                timing=task.timing,
+                task_id,
+                task.vehicle,
+                task.version,
+                old.state,
+                new,
+                reason,
+                actor,
+                now,
+                task.progress,
+                task.timing,
             )
         )
         self._last_event[task_id] = self.recorded
@@ -287,7 +286,7 @@ class TaskRegistry:
         task = self._tasks.pop(task_id)
         self._counts[task.vehicle][task.state] -= 1
         self._forget_live(task)
-        del self._last_event[task_id]
+        self._last_event.pop(task_id, None)
         self.record(TaskWithdrawn(task_id, task.vehicle, now))
 
     def latest(self, submitter: Submitter, command: int, *, vehicle: int) -> Task | None:
@@ -334,7 +333,7 @@ class TaskRegistry:
 
     def is_durable(self, task_id: TaskId) -> bool:
         """Return whether the task's last submission, state change or modification is durable."""
-        return self._last_event[task_id] <= self.durable
+        return self._last_event.get(task_id, 0) <= self.durable
 
     def is_all_durable(self, vehicle: int) -> bool:
         """Return whether all events of a vehicle are durable."""
@@ -349,7 +348,7 @@ class TaskRegistry:
         gone = {task.id: task for task in self._tasks.values() if task.vehicle == vehicle}
         for task_id, task in gone.items():
             del self._tasks[task_id]
-            del self._last_event[task_id]
+            self._last_event.pop(task_id, None)
             self.unplanned.pop(task_id, None)  # the next gateway goes on with its series
             if task.state not in TERMINAL:
                 self._forget_live(task)
@@ -369,7 +368,7 @@ class TaskRegistry:
             oldest = self._finished.popleft()
             task = self._tasks.pop(oldest)
             self._counts[task.vehicle][task.state] -= 1
-            del self._last_event[oldest]
+            self._last_event.pop(oldest, None)
 
     def _note_live(self, task: Task) -> None:
         self._live.setdefault((task.submitter, task.command, task.vehicle), {})[task.id] = None

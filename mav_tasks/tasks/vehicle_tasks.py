@@ -8,9 +8,7 @@ from dataclasses import replace
 from math import inf
 
 from mav_tasks.errors import Rejection
-from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.driving.jump import JumpWatch
 from mav_tasks.tasks.driving.legs import leg_of
 from mav_tasks.tasks.driving.mission_sequencer import (
     goal_of,
@@ -32,8 +30,6 @@ from mav_tasks.tasks.lifecycle import (
     words_of,
 )
 from mav_tasks.tasks.lineup import Lineup, Released
-from mav_tasks.tasks.pending_tasks import PendingTasks
-from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Progress, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
 
@@ -47,14 +43,6 @@ OF_RESTART = frozenset({R.VEHICLE_SILENT, R.NO_POSITION})
 
 class VehicleTasks(Lineup):
     """All tasks of the vehicle with this system id."""
-
-    def __init__(
-        self, vehicle: int, registry: TaskRegistry, room: PendingTasks, settings: Settings
-    ) -> None:
-        super().__init__(vehicle, registry, room, settings)
-        self._jumps = JumpWatch()
-        #: the vehicle at the last step
-        self.seen: VehicleView | None = None
 
     # requests
 
@@ -391,9 +379,9 @@ class VehicleTasks(Lineup):
             self.suspended_ids.pop(task.id, None)
             self.executor.adopt(task)
         self.of_earlier_run.discard(task.id)
-        until = now + self.settings.watch.ready_timeout
-        release = Released(task.id, again, may_continue, actor, until, waits_for, self.halts.term)
-        self._begin_released(task, release, now=now)
+        until, term = now + self.settings.watch.ready_timeout, self.halts.term
+        self.last_released = Released(task.id, again, may_continue, actor, until, R.NONE, term)
+        self._look_at_released(seen, now=now)
 
     def _look_at_released(self, seen: VehicleView, *, now: float) -> None:
         """Start a released task once nothing blocks it; hold it as before if it cannot start."""
@@ -416,18 +404,13 @@ class VehicleTasks(Lineup):
             self.last_released = None
             words = f"holds task {task.id} again: {why_not}. Release it again"
             self.registry.note(self.vehicle, words, now=now)
-        elif waits_for is not release.waits_for:
-            self._begin_released(task, release._replace(waits_for=waits_for), now=now)
-
-    def _begin_released(self, task: Task, release: Released, *, now: float) -> None:
-        """Restart a released task, or let it wait."""
-        if release.waits_for:
-            self.last_released = release
-            self._tell_wait(task.id, release.waits_for, now=now)
-        else:
+        elif not waits_for:
             self.last_released = None
             self.executor.release(task, again=release.again, actor=release.actor, now=now)
             self._begun_at = now
+        elif waits_for is not release.waits_for:
+            self.last_released = release._replace(waits_for=waits_for)
+            self._tell_wait(task.id, waits_for, now=now)
 
     def _waits_for(
         self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
