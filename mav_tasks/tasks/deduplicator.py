@@ -6,7 +6,6 @@ that the rules need, so that a restart forgets nothing.
 
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
-from enum import Enum, auto
 from math import hypot
 
 from mav_tasks.errors import Rejection
@@ -32,26 +31,15 @@ SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
 MANY_CLIENTS = 256  # remembered; beyond this, those with old submissions are forgotten first
 
 
-class Rule(Enum):
-    """Rules that recognise a repeated submission."""
-
-    SAME_PACKET = auto()
-    NONCE = auto()
-    CONFIRMED = auto()
-    SAME_GOAL = auto()
-    SAME_PAYLOAD = auto()
-
-
 @dataclass(frozen=True, slots=True)
 class Known:
-    """The task that a submission repeats, and the rule that found it.
+    """The task that a submission repeats.
 
-    ``is_news``: by a rule that may be mistaken, and for the first time: the client is told.
+    ``repeats``: what it repeats by a rule that may be mistaken, if the client was not told yet.
     """
 
     task_id: TaskId
-    rule: Rule
-    is_news: bool = field(default=False, compare=False)
+    repeats: str = field(default="", compare=False)
 
 
 @dataclass(slots=True)
@@ -63,10 +51,10 @@ class _Last:
     at: float  # of the last copy
     is_told: bool = False
 
-    def repeated(self, rule: Rule) -> Known:
+    def repeated(self, what: str) -> Known:
         """Return what a repeat of it is, and note that its client is told."""
-        is_news, self.is_told = not self.is_told, True
-        return Known(self.task_id, rule, is_news)
+        was_told, self.is_told = self.is_told, True
+        return Known(self.task_id, "" if was_told else what)
 
 
 #: under which a submission is remembered: a packet, or the vehicle (or ANY) that was to go to a
@@ -111,14 +99,14 @@ class SubmissionDeduplicator:
             return None
         same = client.last.get(draft.marks.packet)
         if same is not None and now - same.at <= SAME_PACKET:
-            return Known(same.task_id, Rule.SAME_PACKET)
+            return Known(same.task_id)
         last = client.last.get((draft.vehicle, draft.command))
         if last is not None and last.draft.marks.payload == draft.marks.payload:
             if confirmation > 0 and now - last.at <= CONFIRMED:
-                return Known(last.task_id, Rule.CONFIRMED)
+                return Known(last.task_id)
             if now - last.at <= SAME_PAYLOAD:
                 last.at = now
-                return last.repeated(Rule.SAME_PAYLOAD)
+                return last.repeated("command")
         goal = client.last.get(draft.vehicle)
         if (
             goal is not None
@@ -128,7 +116,7 @@ class SubmissionDeduplicator:
             # copies of this command may follow
             copy = _Last(goal.task_id, draft, now, is_told=True)
             client.last[draft.vehicle, draft.command] = copy
-            return goal.repeated(Rule.SAME_GOAL)
+            return goal.repeated("goal")
         return None
 
     def remember(self, task: Task, *, at: float, now: float) -> None:
@@ -195,7 +183,7 @@ class SubmissionDeduplicator:
             return None
         if task.marks.payload != draft.marks.payload:
             raise reused(draft.marks.nonce)
-        return Known(task.id, Rule.NONCE)
+        return Known(task.id)
 
     def _forget_nonces(self) -> None:
         if len(self._nonces) > 2 * len(self._registry) + SPARE:  # most are of forgotten tasks

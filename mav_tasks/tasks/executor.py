@@ -16,11 +16,10 @@ from mav_tasks.tasks.driving.recovery_path import is_off_line, was_handled
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
 from mav_tasks.tasks.times import Times
 from mav_tasks.tasks.timing import INTERVALS, Timing, TimingMeter
-from mav_tasks.tasks.view import Demand, ModeKind, VehicleView
+from mav_tasks.tasks.view import Demand, ModeKind, VehicleView, start_blocker
 
 S, R = TaskState, TaskReason
 
@@ -114,7 +113,7 @@ class Executor:
         self.task_id = None
         self.drive.forget()
 
-    def resume(self, seen: VehicleView, *, actor: str, now: float) -> None:
+    def resume(self, seen: VehicleView, *, actor: str = SERVER, now: float) -> None:
         """Resume a PAUSED task exactly where it was.
 
         If the vehicle was moved off the task's line, hold the task rather than drive back blindly.
@@ -145,7 +144,7 @@ class Executor:
             self.drive.set_speed(speed)
 
     def pause(
-        self, reason: TaskReason, *, actor: str, now: float, loss: _Loss | None = None
+        self, reason: TaskReason, *, actor: str = SERVER, now: float, loss: _Loss | None = None
     ) -> None:
         """Pause a STARTING or EXECUTING task; stop a lost one from resuming by itself."""
         task = self.task
@@ -180,7 +179,7 @@ class Executor:
         if task.state is S.HELD or task.reason in TAKEN:
             self._change(S.CANCELLED, reason, actor=actor, now=now)
 
-    def let_go(self, *, actor: str, now: float) -> TaskId | None:
+    def let_go(self, *, actor: str = SERVER, now: float) -> TaskId | None:
         """End a CANCELLING task without standstill: its vehicle was taken over, or has rebooted.
 
         Return its id, or None.
@@ -227,7 +226,7 @@ class Executor:
                     return self._run(task, seen, elapsed, now=now)
                 except Becomes as outcome:
                     if outcome.state is S.PAUSED:
-                        self.pause(outcome.reason, actor=SERVER, now=now)
+                        self.pause(outcome.reason, now=now)
                     else:
                         self._change(outcome.state, outcome.reason, now=now)
             case S.PAUSED if self._loss is not None:
@@ -326,7 +325,7 @@ class Executor:
             return False
         untaken_in = seen.mode if seen.is_untouched and not seen.armed else None
         loss = _Loss(now, None if motion is None else motion.pose, untaken_in)
-        self.pause(lost, actor=SERVER, now=now, loss=loss)
+        self.pause(lost, now=now, loss=loss)
         return True
 
     def _wait_for_return(self, task: Task, loss: _Loss, seen: VehicleView, *, now: float) -> None:
@@ -353,7 +352,7 @@ class Executor:
             if there is not None and here is not None and was_handled(task, there, here.pose):
                 self._change(S.HELD, R.OFF_TRACK, now=now)
             else:
-                self.resume(seen, actor=SERVER, now=now)
+                self.resume(seen, now=now)
 
     # states
 

@@ -166,4 +166,4 @@ class Fleet:
             state, reason = S.PAUSED, R.LEASE_LOST
         if task.state is state:
             return task
-        return self._registry.change(task.id, state, reason=reason, actor=SERVER, now=now)
+        return self._registry.change(task.id, state, reason=reason, now=now)

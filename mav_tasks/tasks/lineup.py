@@ -29,12 +29,11 @@ from mav_tasks.tasks.goal import SingleGoal
 from mav_tasks.tasks.halts import DISABLED, Halts
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks
-from mav_tasks.tasks.queue import TaskQueue
+from mav_tasks.tasks.queue import TaskQueue, outranks
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.scheduler import outranks, start_blocker
 from mav_tasks.tasks.task import Task, TaskId, same_frame
 from mav_tasks.tasks.timing import Timing
-from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.view import VehicleView, start_blocker
 
 R, S = TaskReason, TaskState
 
@@ -253,7 +252,7 @@ class Lineup:
 
     # halts
 
-    def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
+    def halt(self, reason: TaskReason, *, actor: str = SERVER, now: float) -> None:
         """Record a halt of the vehicle; a request to resume must be newer.
 
         An immediate task that has not started becomes an ordinary waiting one.
@@ -263,7 +262,7 @@ class Lineup:
         if self.halts.raise_epoch(reason, actor=actor, now=now):
             self.registry.record(VehicleHalted(self.vehicle, self.halts.epoch, reason, actor, now))
 
-    def pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
+    def pause_queue(self, reason: TaskReason, *, actor: str = SERVER, now: float) -> None:
         """Pause the queue; this undoes neither a STOP nor a takeover."""
         if self.paused in (reason, R.STOPPED):
             return
@@ -354,7 +353,7 @@ class Lineup:
                 continue
             outranked = outranks(waiting, running, queueing=queueing)
             if outranked and not self.blocker(seen, goal_of(waiting), now=now):
-                self.executor.pause(R.PREEMPTED, actor=SERVER, now=now)
+                self.executor.pause(R.PREEMPTED, now=now)
                 self.set_aside(running.id)
                 self._begin(waiting, seen, now=now)
                 return True

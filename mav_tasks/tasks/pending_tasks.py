@@ -162,7 +162,7 @@ class PendingTasks:
             if task.id not in self._waiters or task.id in self._queues[task.vehicle]:
                 continue
             if self._has_failed(task.terms.after):  # that was stored, its consequence was not
-                self.end(task, S.FAILED, R.DEPENDENCY_FAILED, actor=SERVER, now=now)
+                self.end(task, S.FAILED, R.DEPENDENCY_FAILED, now=now)
             else:
                 self._settle(task, now=now)
         self._look_again(now=now)
@@ -189,7 +189,7 @@ class PendingTasks:
             came_at = self._waiters[task.id].came_at
             self._rerank(task, came_at=max(came_at, self.times.start(task.terms)))
         if task.state is not wanted:
-            task = self._registry.change(task.id, wanted, reason=R.NONE, actor=SERVER, now=now)
+            task = self._registry.change(task.id, wanted, now=now)
         if wanted is S.QUEUED:
             self._line_up(task)
             self.woken.add(task.vehicle)
@@ -220,7 +220,7 @@ class PendingTasks:
         late = [task for task in due if self.times.is_too_late(task, now=now)]
         for task in late:
             if task.id in self._waiters:
-                self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
+                self.end(task, S.EXPIRED, R.DEADLINE, now=now)
         for task in due:
             if task.id in self._waiters:
                 self.times.started(task)
@@ -313,7 +313,7 @@ class PendingTasks:
         run = next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
         if run is None or not run.left_out:
             return task
-        task = self._registry.modify(task.id, run.terms, actor=SERVER, now=now)
+        task = self._registry.modify(task.id, run.terms, now=now)
         at = utc_text(self.times.start(task.terms) + self.times.wall_offset)
         words = f"left out {left_out_words(1 + run.left_out, run.terms.repeat)}"
         words += f" that passed meanwhile; task {task.id} starts {at}"
@@ -327,7 +327,7 @@ class PendingTasks:
             terms = brought_forward(terms, utc=now + self.times.wall_offset)
         if terms is task.terms:
             return task
-        task = self._registry.modify(task.id, terms, actor=SERVER, now=now)
+        task = self._registry.modify(task.id, terms, now=now)
         self.times.note(task)
         return task
 
@@ -356,14 +356,14 @@ class PendingTasks:
         return gone
 
     def end(
-        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
+        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str = SERVER, now: float
     ) -> None:
         """End a waiting task, and fail its dependents."""
         self._end(task, state, reason, actor=actor, now=now)
         self.ended(task.id, now=now)
 
     def _end(
-        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
+        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str = SERVER, now: float
     ) -> None:
         self.leave(task)
         self._registry.change(task.id, state, reason=reason, actor=actor, now=now)
@@ -478,7 +478,7 @@ class PendingTasks:
                     self._waiters[dependent].is_met = True
                     self._settle(task, now=now)
                 else:
-                    self._end(task, S.FAILED, R.DEPENDENCY_FAILED, actor=SERVER, now=now)
+                    self._end(task, S.FAILED, R.DEPENDENCY_FAILED, now=now)
                     over.append(dependent)
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""The queue of one vehicle, and the order of waiting tasks, which only this module decides.
+"""The queue of one vehicle, and the order of tasks, which only this module decides.
 
 A higher priority runs first; within a priority, first come, first served. Every ``aging`` seconds
 of waiting count as one priority. All tasks age at the same rate, so that a static rank suffices: it
@@ -10,7 +10,9 @@ from bisect import bisect_left, insort
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, QueuePlace, TaskId
+from mav_tasks.settings import Queueing
+from mav_tasks.tasks.lifecycle import TaskState
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, QueuePlace, Task, TaskId
 
 
 class Rank(NamedTuple):
@@ -29,6 +31,20 @@ def rank_of(priority: int, *, came_at: float, task_id: float, aging: float) -> R
         return Rank(False, 0.0, came_at, task_id, priority)
     urgency = came_at - priority * aging if aging > 0 else -float(priority)
     return Rank(True, urgency, came_at, task_id, priority)
+
+
+def outranks(waiting: Task, running: Task, *, queueing: Queueing) -> bool:
+    """Return whether a waiting task may interrupt a running one.
+
+    Only the submitted or modified terms count, not aging and not an inherited rank.
+    """
+    is_running = running.state in (TaskState.STARTING, TaskState.EXECUTING)
+    if not is_running or not running.terms.is_preemptible:
+        return False
+    ahead = waiting.priority - running.priority
+    if waiting.terms.is_preemptive:
+        return not running.terms.is_preemptive or ahead > 0
+    return 0 < queueing.preemption_gap <= ahead
 
 
 class Entry(NamedTuple):

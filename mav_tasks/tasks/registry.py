@@ -12,6 +12,7 @@ from typing import cast
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.events import (
+    SERVER,
     Event,
     StepReached,
     TaskAdvanced,
@@ -186,9 +187,9 @@ class TaskRegistry:
         task_id: TaskId,
         new: TaskState,
         *,
-        reason: TaskReason,
-        actor: str,
         now: float,
+        reason: TaskReason = TaskReason.NONE,
+        actor: str = SERVER,
         progress: Progress | None = None,
         timing: Timing | None = None,
     ) -> Task:
@@ -234,7 +235,7 @@ class TaskRegistry:
             self._finish(task_id)
         return task
 
-    def modify(self, task_id: TaskId, terms: Terms, *, actor: str, now: float) -> Task:
+    def modify(self, task_id: TaskId, terms: Terms, *, actor: str = SERVER, now: float) -> Task:
         """Change the terms of a task that is not over, or no longer repeats."""
         old = self._tasks[task_id]
         task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)

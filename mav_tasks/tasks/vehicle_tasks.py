@@ -61,7 +61,7 @@ class VehicleTasks(Lineup):
     ) -> None:
         """Load the active and suspended tasks of an earlier run; those ``resuming`` go on alone."""
         self.halts.restore(halt_epoch, halt, now=now)
-        self.halt(R.RESTARTED, actor=SERVER, now=now)
+        self.halt(R.RESTARTED, now=now)
         self.paused, self._speed, self.uid = paused, speed, uid
         self.may_be_armed = may_be_armed
         self._apply_driving()
@@ -76,7 +76,7 @@ class VehicleTasks(Lineup):
 
     def belong_to_another(self, *, now: float) -> None:
         """Hold and pause these tasks: another vehicle answers at the address of theirs."""
-        self._end_cancelling(actor=SERVER, now=now)
+        self._end_cancelling(now=now)
         self.hold(R.FRAME_RESET, now=now)
         self._wait_for_somebody(now=now)
         self.stopping_after_kill = False
@@ -89,12 +89,12 @@ class VehicleTasks(Lineup):
 
     def _wait_for_somebody(self, *, now: float) -> None:
         """Start nothing before somebody has looked which vehicle this is."""
-        self.halt(R.RESTARTED, actor=SERVER, now=now)
+        self.halt(R.RESTARTED, now=now)
         if not self.is_empty:
-            self.executor.pause(R.OPERATOR, actor=SERVER, now=now)
-            self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
+            self.executor.pause(R.OPERATOR, now=now)
+            self.pause_queue(R.RESTARTED, now=now)
 
-    def _end_cancelling(self, *, actor: str, now: float) -> None:
+    def _end_cancelling(self, *, actor: str = SERVER, now: float) -> None:
         """End a CANCELLING task without waiting for standstill."""
         if (ended := self.executor.let_go(actor=actor, now=now)) is not None:
             self._ended(ended, now=now)
@@ -261,12 +261,12 @@ class VehicleTasks(Lineup):
         FRAME_RESET also holds the paused tasks that had started a leg: their lines are lost, too.
         """
         if self.is_driving:
-            self.halt(reason, actor=SERVER, now=now)
+            self.halt(reason, now=now)
         self.executor.hold(reason, now=now)
         if reason is R.FRAME_RESET:
             for task in self.suspended:
                 if task.state is S.PAUSED and task.progress.anchor is not None:
-                    self.registry.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
+                    self.registry.change(task.id, S.HELD, reason=reason, now=now)
 
     def restarted(self, *, was_paused: TaskReason, now: float) -> bool:
         """Hold the tasks of a vehicle that has rebooted, and pause the queue until it is resumed.
@@ -276,12 +276,12 @@ class VehicleTasks(Lineup):
         queue was paused before the vehicle showed disarmed: the reboot disarmed it, no takeover.
         """
         was_driving = self.is_driving
-        self._end_cancelling(actor=SERVER, now=now)
+        self._end_cancelling(now=now)
         if not self.suspended_ids and self.executor.begins_again(now=now):
             return False
         self.hold(R.FRAME_RESET, now=now)
         if was_driving and not was_paused:
-            self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
+            self.pause_queue(R.RESTARTED, now=now)
         return was_driving
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
@@ -326,10 +326,10 @@ class VehicleTasks(Lineup):
 
         That run has done so, but its last events may not have been stored.
         """
-        self._repeat_nothing(R.STOP, actor=SERVER, now=now, since=at)
+        self._repeat_nothing(R.STOP, now=now, since=at)
 
     def _repeat_nothing(
-        self, reason: TaskReason, *, actor: str, now: float, since: float = inf
+        self, reason: TaskReason, *, actor: str = SERVER, now: float, since: float = inf
     ) -> None:
         """End each series: its waiting run ends, one that has started does not repeat.
 
@@ -460,7 +460,7 @@ class VehicleTasks(Lineup):
         if active is None:
             self._ended(before.id, now=now)
         elif active.state is not before.state and active.state in (S.PAUSED, S.HELD):
-            self.halt(active.reason, actor=SERVER, now=now)
+            self.halt(active.reason, now=now)
 
     def _ended(self, task_id: TaskId, *, now: float) -> None:
         """Handle the end of a task. Pause the queue after a failure that had moved the vehicle."""
@@ -468,7 +468,7 @@ class VehicleTasks(Lineup):
         if task_id == self.immediate:
             self.immediate = None
         if task.state is S.FAILED and has_moved(task) and self.settings.on_failure == "pause":
-            self.pause_queue(task.reason, actor=SERVER, now=now)
+            self.pause_queue(task.reason, now=now)
         self.room.ended(task_id, now=now)
 
 

@@ -33,9 +33,8 @@ from mav_tasks.tasks.goal import (
     SetSpeed,
     SingleGoal,
 )
-from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress
-from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.view import VehicleView, place_of
 
 #: rad; a car stops before a larger turn: it may be shorter to reverse
 ROLLING_TURN = radians(100)
