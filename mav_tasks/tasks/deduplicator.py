@@ -28,7 +28,7 @@ NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
 RECENT = 3_000  # entries of one client; CommandReceiver has a list, too, but not after a restart
 SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
-MANY_CLIENTS = 256  # remembered; beyond this, those with old submissions are forgotten first
+MANY_CLIENTS = 256  # remembered; beyond this, those with the oldest submissions are forgotten
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +62,12 @@ class _Last:
 _Mark = str | int | tuple[int, int]
 
 
-@dataclass(slots=True)
-class _Client:
-    last: dict[_Mark, _Last] = field(default_factory=dict)
-    at: float = 0.0
-
-
 class SubmissionDeduplicator:
     """Recent submissions of each client, and the nonces of unfinished and recent tasks."""
 
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
-        self._clients: dict[Submitter, _Client] = {}
+        self._clients: dict[Submitter, dict[_Mark, _Last]] = {}
         self._nonces: dict[tuple[str, int, int, int], TaskId] = {}
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
@@ -94,20 +88,18 @@ class SubmissionDeduplicator:
         """
         if draft.marks.nonce:
             return self._by_nonce(draft, now=now)
-        client = self._clients.get(draft.submitter)
-        if client is None:
-            return None
-        same = client.last.get(draft.marks.packet)
+        client = self._clients.get(draft.submitter, {})
+        same = client.get(draft.marks.packet)
         if same is not None and now - same.at <= SAME_PACKET:
             return Known(same.task_id)
-        last = client.last.get((draft.vehicle, draft.command))
+        last = client.get((draft.vehicle, draft.command))
         if last is not None and last.draft.marks.payload == draft.marks.payload:
             if confirmation > 0 and now - last.at <= CONFIRMED:
                 return Known(last.task_id)
             if now - last.at <= SAME_PAYLOAD:
                 last.at = now
                 return last.repeated("command")
-        goal = client.last.get(draft.vehicle)
+        goal = client.get(draft.vehicle)
         if (
             goal is not None
             and now - goal.at <= SAME_GOAL
@@ -115,7 +107,7 @@ class SubmissionDeduplicator:
         ):
             # copies of this command may follow
             copy = _Last(goal.task_id, draft, now, is_told=True)
-            client.last[draft.vehicle, draft.command] = copy
+            client[draft.vehicle, draft.command] = copy
             return goal.repeated("goal")
         return None
 
@@ -129,48 +121,43 @@ class SubmissionDeduplicator:
         is_place = isinstance(task.goal, GoTo)
         if now - at > LONGEST or (marks.nonce and not is_place):
             return  # its nonce alone identifies it
-        client = self._clients.get(submitter)
-        if client is None:
-            if len(self._clients) >= MANY_CLIENTS:
-                self._forget_old(now=now)
-            client = _Client()
-            keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
-        client.at = at
+        client = self._clients.get(submitter, {})
+        keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
         vehicle = task.submitted_to
         draft = Draft(vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
         if is_place:
-            keep_latest(client.last, vehicle, last, most=RECENT)
+            client[vehicle] = last
         if not marks.nonce:
-            keep_latest(client.last, (vehicle, task.command), last, most=RECENT)
+            client[vehicle, task.command] = last
         if marks.packet and not marks.nonce:
-            keep_latest(client.last, marks.packet, last, most=RECENT)
+            keep_latest(client, marks.packet, last, most=RECENT)
 
     def held(self, submitter: Submitter, vehicle: int) -> None:
         """Forget a client's last return after its halt: the next return is new (rule 4).
 
         A go-to is not forgotten: other messages for the same go-to may still be on their way.
         """
-        client = self._clients.get(submitter)
-        goal = None if client is None else client.last.get(vehicle)
-        if client is not None and goal is not None and goal.draft.goal == GoTo(None):
-            del client.last[vehicle]
+        client = self._clients.get(submitter, {})
+        goal = client.get(vehicle)
+        if goal is not None and goal.draft.goal == GoTo(None):
+            del client[vehicle]
 
     def forget(self, task: Task) -> None:
         """Forget a submission that was refused after all, so that the client may try it again."""
         if task.marks.nonce:
             self._nonces.pop(_key(task.submitter, task.marks.nonce), None)
-        if client := self._clients.get(task.submitter):
-            kept = {mark: each for mark, each in client.last.items() if each.task_id != task.id}
-            client.last = kept
+        client = self._clients.get(task.submitter, {})
+        for mark in [mark for mark, each in client.items() if each.task_id == task.id]:
+            del client[mark]
 
     def forget_vehicle(self, vehicle: int, tasks: Container[TaskId]) -> None:
         """Forget a vehicle with its ``tasks``: the next gateway that has it knows them."""
         self._nonces = {key: each for key, each in self._nonces.items() if each not in tasks}
-        for client in self._clients.values():
-            client.last = {
+        for submitter, client in self._clients.items():
+            self._clients[submitter] = {
                 mark: each
-                for mark, each in client.last.items()
+                for mark, each in client.items()
                 if each.draft.vehicle != vehicle and each.task_id not in tasks
             }
 
@@ -189,10 +176,6 @@ class SubmissionDeduplicator:
         if len(self._nonces) > 2 * len(self._registry) + SPARE:  # most are of forgotten tasks
             kept = {k: t for k, t in self._nonces.items() if self._registry.get(t) is not None}
             self._nonces = kept
-
-    def _forget_old(self, *, now: float) -> None:
-        for submitter in [s for s, c in self._clients.items() if now - c.at > LONGEST]:
-            del self._clients[submitter]
 
 
 def reused(nonce: int) -> Rejection:

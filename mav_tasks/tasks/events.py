@@ -502,12 +502,13 @@ def _changes(before: Terms, after: Terms, at: float) -> Iterator[str]:
         yield _start_of(after, at)
     if (after.deadline, after.start_within) != (before.deadline, before.start_within):
         yield _deadline_of(after, at)
-    if after.is_preemptible != before.is_preemptible:
-        yield "pre-emptible" if after.is_preemptible else "not pre-emptible"
-    if after.is_preemptive != before.is_preemptive:
-        yield "pre-emptive" if after.is_preemptive else "not pre-emptive"
-    if after.is_staged != before.is_staged:
-        yield "needs a start command" if after.is_staged else "start command received"
+    for term, yes, no in (
+        ("is_preemptible", "pre-emptible", "not pre-emptible"),
+        ("is_preemptive", "pre-emptive", "not pre-emptive"),
+        ("is_staged", "needs a start command", "start command received"),
+    ):
+        if getattr(after, term) != getattr(before, term):
+            yield yes if getattr(after, term) else no
     if after.repeat != before.repeat:
         yield f"repeats: {repeat_words(after.repeat)}" if after.repeat else "does not repeat"
     if after.label != before.label:

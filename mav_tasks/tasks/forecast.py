@@ -74,9 +74,7 @@ class Forecast:
             if not self._ready:
                 clock = max(clock, self._due[0][0])
             while self._due and self._due[0][0] <= clock:
-                task = self._registry[heappop(self._due)[1]]
-                if not task.terms.is_staged and not self._is_blocked(task):
-                    heappush(self._ready, (self._tasks.room.rank(task), task.id))
+                self._let_go(self._registry[heappop(self._due)[1]], clock)
             if not self._ready:
                 continue
             task = self._registry[heappop(self._ready)[1]]
@@ -85,7 +83,7 @@ class Forecast:
             clock += seconds
             self._done.add(task.id)
             for dependent in self._dependents.pop(task.id, []):
-                self._let_go(dependent)
+                self._let_go(dependent, clock)
             if empty is None and not self._ready:
                 empty = Estimate(clock, pose)
         return times, empty or UNKNOWN
@@ -106,15 +104,15 @@ class Forecast:
                 due = tasks.start_time(task) - self._now
                 times[task_id] = (due, nan)  # the earliest; other tasks may delay it
                 heappush(self._due, (due, task_id))
-            elif not task.terms.is_staged and not self._is_blocked(task):
-                self._let_go(task)
+            else:
+                self._let_go(task, 0.0)
 
-    def _let_go(self, task: Task) -> None:
+    def _let_go(self, task: Task, clock: float) -> None:
         """Put a task that waits for no other one among the ready ones, or those due later."""
         due = self._tasks.start_time(task) - self._now
-        if due > 0:
+        if due > clock:
             heappush(self._due, (due, task.id))
-        else:
+        elif not task.terms.is_staged and not self._is_blocked(task):
             heappush(self._ready, (self._tasks.room.rank(task), task.id))
 
     def _is_blocked(self, task: Task) -> bool:

@@ -150,15 +150,12 @@ class PendingTasks:
             if task.id in self._dependents:  # a modification may have put dependents first
                 self._lift(task.id)
         ready: dict[int, list[Entry]] = {}
-        others: list[Task] = []
         for task in waiting:
             if task.state is S.QUEUED and self._wanted(task, now=now) is S.QUEUED:
                 ready.setdefault(task.vehicle, []).append(self._entry(task))
-            else:
-                others.append(task)
         for vehicle, entries in ready.items():
             self._queues[vehicle].put_all(entries)
-        for task in others:
+        for task in waiting:
             if task.id not in self._waiters or task.id in self._queues[task.vehicle]:
                 continue
             if self._has_failed(task.terms.after):  # that was stored, its consequence was not

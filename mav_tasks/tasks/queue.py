@@ -41,10 +41,10 @@ def outranks(waiting: Task, running: Task, *, queueing: Queueing) -> bool:
     is_running = running.state in (TaskState.STARTING, TaskState.EXECUTING)
     if not is_running or not running.terms.is_preemptible:
         return False
-    ahead = waiting.priority - running.priority
     if waiting.terms.is_preemptive:
-        return not running.terms.is_preemptive or ahead > 0
-    return 0 < queueing.preemption_gap <= ahead
+        return not running.terms.is_preemptive or waiting.priority > running.priority
+    gap = queueing.preemption_gap
+    return gap > 0 and waiting.priority - running.priority >= gap
 
 
 class Entry(NamedTuple):

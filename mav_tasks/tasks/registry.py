@@ -132,12 +132,11 @@ class TaskRegistry:
 
     def counts(self, vehicle: int) -> list[int]:
         """Return how many tasks of a vehicle are in each state; the index is the TaskState."""
-        return list(self._counts.get(vehicle, [0] * STATES))
+        return list(self._counts[vehicle])
 
     def count_waiting(self, vehicle: int) -> int:
         """Return how many tasks of a vehicle have not started."""
-        counts = self._counts.get(vehicle)
-        return 0 if counts is None else sum(map(counts.__getitem__, WAITING))
+        return sum(self._counts[vehicle][: TaskState.STARTING])
 
     def restore(self, tasks: Sequence[Task]) -> None:
         """Load the tasks of an earlier run, all of them durable."""
