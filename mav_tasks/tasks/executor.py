@@ -143,15 +143,11 @@ class Executor:
             self._registry.note_progress(task.id, replace(task.progress, speed=speed))
             self.drive.set_speed(speed)
 
-    def pause(
-        self, reason: TaskReason, *, actor: str = SERVER, now: float, loss: _Loss | None = None
-    ) -> None:
+    def pause(self, reason: TaskReason, *, actor: str = SERVER, now: float) -> None:
         """Pause a STARTING or EXECUTING task; stop a lost one from resuming by itself."""
         task = self.task
         self._loss = None  # no edge PAUSED -> PAUSED, but a lost task no longer resumes by itself
         if task is not None and task.state in (S.STARTING, S.EXECUTING):
-            if reason in LOSSES:
-                self._loss = loss or _Loss(now)
             self._change(S.PAUSED, reason, actor=actor, now=now)
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
@@ -225,10 +221,7 @@ class Executor:
                 try:
                     return self._run(task, seen, elapsed, now=now)
                 except Becomes as outcome:
-                    if outcome.state is S.PAUSED:
-                        self.pause(outcome.reason, now=now)
-                    else:
-                        self._change(outcome.state, outcome.reason, now=now)
+                    self._change(outcome.state, outcome.reason, now=now)
             case S.PAUSED if self._loss is not None:
                 self._wait_for_return(task, self._loss, seen, now=now)
             case S.CANCELLING if seen.still:
@@ -324,8 +317,8 @@ class Executor:
         else:
             return False
         untaken_in = seen.mode if seen.is_untouched and not seen.armed else None
-        loss = _Loss(now, None if motion is None else motion.pose, untaken_in)
-        self.pause(lost, now=now, loss=loss)
+        self._change(S.PAUSED, lost, now=now)
+        self._loss = _Loss(now, None if motion is None else motion.pose, untaken_in)
         return True
 
     def _wait_for_return(self, task: Task, loss: _Loss, seen: VehicleView, *, now: float) -> None:
@@ -381,5 +374,7 @@ class Executor:
         if new is S.EXECUTING:
             period = self._settings.watch.setpoint_period
             self._meter = TimingMeter(period=period, before=old.timing, every=self.intervals)
+        elif new is S.PAUSED and reason in LOSSES:
+            self._loss = _Loss(now)
         elif new in TERMINAL:
             self.give_up()

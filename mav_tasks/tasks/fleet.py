@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, QueuePaused
-from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, WORDS, LastHalt
+from mav_tasks.tasks.halts import WORDS, LastHalt
 from mav_tasks.tasks.lifecycle import ACTIVE, LOSSES, RUNNING, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
@@ -44,7 +44,7 @@ class Fleet:
             tasks = VehicleTasks(vehicle, self._registry, self.room, self._settings)
             self._of[vehicle] = tasks
             if self._comes_up_paused:
-                tasks.restore(paused=R.RESTARTED, now=self.began_at)
+                tasks.restore((), Restored(), paused=R.RESTARTED, now=self.began_at)
                 self._registry.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self.began_at))
         return tasks
 
@@ -142,20 +142,7 @@ class Fleet:
             if not paused and (has_paused or is_unclean or is_forgotten):
                 paused = R.RESTARTED
                 self._registry.record(QueuePaused(vehicle, paused, SERVER, now))
-            halt = LastHalt(*restored.halted.get(vehicle, NOBODY))
-            self.of(vehicle).restore(
-                tasks,
-                paused=paused,
-                speed=restored.speeds.get(vehicle),
-                uid=restored.uids.get(vehicle, ""),
-                halt_epoch=restored.halt_epochs.get(vehicle, 1),
-                halt=halt if halt.reason in BY_SOMEBODY else NOBODY,
-                may_be_armed=vehicle not in restored.disarmed,
-                resuming=goes_on,
-                now=now,
-            )
-            if paused is R.STOPPED and halt.reason is R.STOPPED:
-                self.of(vehicle).was_stopped(at=halt.at, now=now)
+            self.of(vehicle).restore(tasks, restored, paused=paused, resuming=goes_on, now=now)
 
     def _interrupted(self, task: Task, *, is_elsewhere: bool, now: float) -> Task:
         """Hold a task that ran, or pause it if it is to resume by itself here."""

@@ -20,7 +20,7 @@ from mav_tasks.tasks.driving.recovery_path import is_off_line
 from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import MoveTurned, Plan, Rotate
-from mav_tasks.tasks.halts import NOBODY, LastHalt
+from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, LastHalt
 from mav_tasks.tasks.lifecycle import (
     CONTINUE_FIRST,
     TAKEN,
@@ -30,6 +30,7 @@ from mav_tasks.tasks.lifecycle import (
     words_of,
 )
 from mav_tasks.tasks.lineup import Lineup, Released
+from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Draft, Progress, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
 
@@ -48,22 +49,22 @@ class VehicleTasks(Lineup):
 
     def restore(
         self,
-        tasks: Iterable[Task] = (),
+        tasks: Iterable[Task],
+        restored: Restored,
         *,
         paused: TaskReason,
-        now: float,
-        speed: float | None = None,
-        uid: str = "",
-        halt_epoch: int = 1,
-        halt: LastHalt = NOBODY,
-        may_be_armed: bool = True,
         resuming: Container[TaskId] = (),
+        now: float,
     ) -> None:
         """Load the active and suspended tasks of an earlier run; those ``resuming`` go on alone."""
-        self.halts.restore(halt_epoch, halt, now=now)
+        vehicle = self.vehicle
+        last = LastHalt(*restored.halted.get(vehicle, NOBODY))
+        by_somebody = last if last.reason in BY_SOMEBODY else NOBODY
+        self.halts.restore(restored.halt_epochs.get(vehicle, 1), by_somebody, now=now)
         self.halt(R.RESTARTED, now=now)
-        self.paused, self._speed, self.uid = paused, speed, uid
-        self.may_be_armed = may_be_armed
+        self.paused, self._speed = paused, restored.speeds.get(vehicle)
+        self.uid = restored.uids.get(vehicle, "")
+        self.may_be_armed = vehicle not in restored.disarmed
         self._apply_driving()
         for task in tasks:
             self.of_earlier_run.add(task.id)
@@ -73,6 +74,9 @@ class VehicleTasks(Lineup):
                 self.executor.take_over(task, now=now)
             else:
                 self.executor.adopt(task)
+        if paused is R.STOPPED and last.reason is R.STOPPED:
+            # the earlier run has done so, but its last events may not have been stored
+            self._repeat_nothing(R.STOP, now=now, since=last.at)
 
     def belong_to_another(self, *, now: float) -> None:
         """Hold and pause these tasks: another vehicle answers at the address of theirs."""
@@ -320,13 +324,6 @@ class VehicleTasks(Lineup):
             if task.is_click:
                 self._end(task, S.KILLED, R.STOP, actor=actor, now=now)
         self.immediate = None
-
-    def was_stopped(self, *, at: float, now: float) -> None:
-        """End each series that was there at a STOP of an earlier run.
-
-        That run has done so, but its last events may not have been stored.
-        """
-        self._repeat_nothing(R.STOP, now=now, since=at)
 
     def _repeat_nothing(
         self, reason: TaskReason, *, actor: str = SERVER, now: float, since: float = inf
