@@ -263,7 +263,7 @@ SEAMS = (
     *("mav_tasks.engine.inputs", "mav_tasks.engine.snapshot", "mav_tasks.settings"),
     "mav_tasks.errors",
     # its events and words, and the parameters that it publishes
-    *("mav_tasks.tasks.events", "mav_tasks.tasks.server_events", "mav_tasks.tasks.lifecycle"),
+    *("mav_tasks.tasks.events", "mav_tasks.tasks.lifecycle"),
     *("mav_tasks.tasks.task", "mav_tasks.tasks.goal", "mav_tasks.tasks.restored"),
     *("mav_tasks.tasks.view", "mav_tasks.tasks.timing", "mav_tasks.services.parameter_table"),
     # contracts that have several implementations

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 #: what takes part in each packet, each step of a task and each set-point
 COMPILED = ("mavlink", "services", "tasks", "engine")
 #: the store and the records read the annotations of these classes, which mypyc does not keep
-STORED = tuple(f"tasks/{name}.py" for name in ("task", "timing", "goal", "events", "server_events"))
+STORED = tuple(f"tasks/{name}.py" for name in ("task", "timing", "goal", "events"))
 #: generated, and built when they are first needed: nothing to gain
 LEFT_OUT = (*STORED, "mavlink/_dialect.py", "mavlink/layout.py")
 #: of the extension module that has all the code; each module has a small one beside its source

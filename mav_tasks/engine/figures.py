@@ -10,8 +10,8 @@ from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.histogram import Distribution
 from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.forecast import tally
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.outlook import tally
 from mav_tasks.tasks.registry import TaskRegistry
 
 

@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from mav_tasks.tasks.events import Event, TaskModified, TaskSubmitted
-from mav_tasks.tasks.term_changes import changes_of
+from mav_tasks.tasks.events import Event, TaskModified, TaskSubmitted, changes_of
 
 #: event number over the life of the store, event
 Entry = tuple[int, Event]

@@ -19,6 +19,8 @@ from mav_tasks.store.codec import MONOTONIC
 from mav_tasks.tasks.events import (
     Event,
     QueuePaused,
+    SignatureRefused,
+    SignaturesSeen,
     SubmissionRefused,
     TaskChanged,
     TaskProgressed,
@@ -28,7 +30,6 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.goal import Goal, Place
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen
 from mav_tasks.tasks.task import Submitter, Task
 
 #: dedup keys, a plan's items as received, the histogram of intervals, and times that the line has

@@ -8,9 +8,9 @@ from dataclasses import astuple, fields, is_dataclass
 from typing import Any
 
 from mav_tasks.settings import Settings, VehicleProfile
+from mav_tasks.tasks.events import SignatureTime
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
 

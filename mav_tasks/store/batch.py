@@ -6,9 +6,11 @@ from typing import Any
 from mav_tasks.store.codec import Encoder, dumps
 from mav_tasks.tasks.events import (
     Event,
+    ParameterSet,
     PlanStored,
     QueueContinued,
     QueuePaused,
+    SignaturesSeen,
     TaskAdvanced,
     TaskAssigned,
     TaskChanged,
@@ -22,7 +24,6 @@ from mav_tasks.tasks.events import (
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.halts import BY_SOMEBODY
-from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
 from mav_tasks.tasks.task import Task, following
 
 

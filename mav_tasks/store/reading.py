@@ -16,6 +16,7 @@ from mav_tasks.store.codec import Decoder, Unreadable, loads
 from mav_tasks.store.connection import Connection
 from mav_tasks.store.event_database import Reader
 from mav_tasks.tasks.events import (
+    SignatureTime,
     TaskAdvanced,
     TaskAssigned,
     TaskChanged,
@@ -24,7 +25,6 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
 CHUNK = 1_000  # rows whose JSON is parsed in one call

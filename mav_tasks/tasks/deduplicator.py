@@ -6,13 +6,12 @@ that the rules need, so that a restart forgets nothing.
 
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
-from enum import Enum, auto
 from math import hypot
 
 from mav_tasks.errors import Rejection
 from mav_tasks.latest import keep_latest
-from mav_tasks.tasks.frames import to_local
-from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place
+from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.goal import GlobalPlace, GoTo
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
@@ -27,31 +26,20 @@ SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
 #: person without an answer tries again within minutes
 NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
-PACKETS = 1_000  # per client, for rule 1; CommandReceiver has a list, too, but not after a restart
+RECENT = 3_000  # entries of one client; CommandReceiver has a list, too, but not after a restart
 SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
-MANY_CLIENTS = 256  # remembered; beyond this, those with old submissions are forgotten first
-
-
-class Rule(Enum):
-    """Rules that recognise a repeated submission."""
-
-    SAME_PACKET = auto()
-    NONCE = auto()
-    CONFIRMED = auto()
-    SAME_GOAL = auto()
-    SAME_PAYLOAD = auto()
+MANY_CLIENTS = 256  # remembered; beyond this, those with the oldest submissions are forgotten
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """The task that a submission repeats, and the rule that found it.
+    """The task that a submission repeats.
 
-    ``is_news``: by a rule that may be mistaken, and for the first time: the client is told.
+    ``repeats``: what it repeats by a rule that may be mistaken, if the client was not told yet.
     """
 
     task_id: TaskId
-    rule: Rule
-    is_news: bool = field(default=False, compare=False)
+    repeats: str = field(default="", compare=False)
 
 
 @dataclass(slots=True)
@@ -63,19 +51,15 @@ class _Last:
     at: float  # of the last copy
     is_told: bool = False
 
-    def repeated(self, rule: Rule) -> Known:
+    def repeated(self, what: str) -> Known:
         """Return what a repeat of it is, and note that its client is told."""
-        is_news, self.is_told = not self.is_told, True
-        return Known(self.task_id, rule, is_news)
+        was_told, self.is_told = self.is_told, True
+        return Known(self.task_id, "" if was_told else what)
 
 
-@dataclass(slots=True)
-class _Client:
-    #: by the vehicle that was named, or ANY; and by command
-    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)
-    goals: dict[int, _Last] = field(default_factory=dict)  # by that vehicle
-    packets: dict[str, _Last] = field(default_factory=dict)
-    at: float = 0.0
+#: under which a submission is remembered: a packet, or the vehicle (or ANY) that was to go to a
+#: place, or that vehicle and a command
+_Mark = str | int | tuple[int, int]
 
 
 class SubmissionDeduplicator:
@@ -83,21 +67,15 @@ class SubmissionDeduplicator:
 
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
-        self._clients: dict[Submitter, _Client] = {}
+        self._clients: dict[Submitter, dict[_Mark, _Last]] = {}
         self._nonces: dict[tuple[str, int, int, int], TaskId] = {}
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Load the tasks of an earlier run, oldest first: all nonces, and recent submissions."""
         for task in tasks:
-            if task.is_made:
-                continue  # nobody submitted it
-            nonce = task.marks.nonce
-            if nonce:
-                self._nonces[_key(task.submitter, nonce)] = task.id
-            # later than now: the clock was set back since, or was another gateway's
-            at = min(task.submitted_at, now)
-            if now - at <= LONGEST and not (nonce and not isinstance(task.goal, GoTo)):
-                self.remember(task, at=at, now=now)
+            if not task.is_made:  # nobody submitted that
+                # later than now: the clock was set back since, or was another gateway's
+                self.remember(task, at=min(task.submitted_at, now), now=now)
 
     def known(
         self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float
@@ -110,20 +88,18 @@ class SubmissionDeduplicator:
         """
         if draft.marks.nonce:
             return self._by_nonce(draft, now=now)
-        client = self._clients.get(draft.submitter)
-        if client is None:
-            return None
-        same = client.packets.get(draft.marks.packet)
+        client = self._clients.get(draft.submitter, {})
+        same = client.get(draft.marks.packet)
         if same is not None and now - same.at <= SAME_PACKET:
-            return Known(same.task_id, Rule.SAME_PACKET)
-        last = client.of_command.get((draft.vehicle, draft.command))
+            return Known(same.task_id)
+        last = client.get((draft.vehicle, draft.command))
         if last is not None and last.draft.marks.payload == draft.marks.payload:
             if confirmation > 0 and now - last.at <= CONFIRMED:
-                return Known(last.task_id, Rule.CONFIRMED)
+                return Known(last.task_id)
             if now - last.at <= SAME_PAYLOAD:
                 last.at = now
-                return last.repeated(Rule.SAME_PAYLOAD)
-        goal = client.goals.get(draft.vehicle)
+                return last.repeated("command")
+        goal = client.get(draft.vehicle)
         if (
             goal is not None
             and now - goal.at <= SAME_GOAL
@@ -131,8 +107,8 @@ class SubmissionDeduplicator:
         ):
             # copies of this command may follow
             copy = _Last(goal.task_id, draft, now, is_told=True)
-            client.of_command[draft.vehicle, draft.command] = copy
-            return goal.repeated(Rule.SAME_GOAL)
+            client[draft.vehicle, draft.command] = copy
+            return goal.repeated("goal")
         return None
 
     def remember(self, task: Task, *, at: float, now: float) -> None:
@@ -142,86 +118,64 @@ class SubmissionDeduplicator:
             self._nonces[_key(submitter, marks.nonce)] = task.id
             if len(self._nonces) > SPARE:
                 self._forget_nonces()
-        if now - at > LONGEST:
-            return
-        client = self._clients.get(submitter)
-        if client is None:
-            if len(self._clients) >= MANY_CLIENTS:
-                self._forget_old(now=now)
-            client = _Client()
-            keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
-        client.at = at
-        if marks.nonce and not isinstance(task.goal, GoTo):
+        is_place = isinstance(task.goal, GoTo)
+        if now - at > LONGEST or (marks.nonce and not is_place):
             return  # its nonce alone identifies it
+        client = self._clients.get(submitter, {})
+        keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
         vehicle = task.submitted_to
         draft = Draft(vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
-        if isinstance(task.goal, GoTo):
-            client.goals[vehicle] = last
-        if marks.nonce:
-            return
-        client.of_command[vehicle, task.command] = last
-        if marks.packet:
-            keep_latest(client.packets, marks.packet, last, most=PACKETS)
+        if is_place:
+            client[vehicle] = last
+        if not marks.nonce:
+            client[vehicle, task.command] = last
+        if marks.packet and not marks.nonce:
+            keep_latest(client, marks.packet, last, most=RECENT)
 
     def held(self, submitter: Submitter, vehicle: int) -> None:
         """Forget a client's last return after its halt: the next return is new (rule 4).
 
         A go-to is not forgotten: other messages for the same go-to may still be on their way.
         """
-        client = self._clients.get(submitter)
-        goal = None if client is None else client.goals.get(vehicle)
-        if client is not None and goal is not None and goal.draft.goal == GoTo(None):
-            del client.goals[vehicle]
+        client = self._clients.get(submitter, {})
+        goal = client.get(vehicle)
+        if goal is not None and goal.draft.goal == GoTo(None):
+            del client[vehicle]
 
     def forget(self, task: Task) -> None:
         """Forget a submission that was refused after all, so that the client may try it again."""
         if task.marks.nonce:
             self._nonces.pop(_key(task.submitter, task.marks.nonce), None)
-        client = self._clients.get(task.submitter)
-        if client is None:
-            return
-        vehicle = task.submitted_to
-        last = client.of_command.get((vehicle, task.command))
-        if last is not None and last.task_id == task.id:
-            del client.of_command[vehicle, task.command]
-        goal = client.goals.get(vehicle)
-        if goal is not None and goal.task_id == task.id:
-            del client.goals[vehicle]
-        client.packets.pop(task.marks.packet, None)
+        client = self._clients.get(task.submitter, {})
+        for mark in [mark for mark, each in client.items() if each.task_id == task.id]:
+            del client[mark]
 
     def forget_vehicle(self, vehicle: int, tasks: Container[TaskId]) -> None:
         """Forget a vehicle with its ``tasks``: the next gateway that has it knows them."""
         self._nonces = {key: each for key, each in self._nonces.items() if each not in tasks}
-        for client in self._clients.values():
-            for place, goal in tuple(client.goals.items()):
-                if place == vehicle or goal.task_id in tasks:  # submitted to any vehicle
-                    del client.goals[place]
-            for key, last in tuple(client.of_command.items()):
-                if key[0] == vehicle or last.task_id in tasks:
-                    del client.of_command[key]
-            packets = client.packets.items()
-            client.packets = {key: last for key, last in packets if last.task_id not in tasks}
+        for submitter, client in self._clients.items():
+            self._clients[submitter] = {
+                mark: each
+                for mark, each in client.items()
+                if each.draft.vehicle != vehicle and each.task_id not in tasks
+            }
 
     def _by_nonce(self, draft: Draft, *, now: float) -> Known | None:
         key = _key(draft.submitter, draft.marks.nonce)
         task_id = self._nonces.get(key)
         task = None if task_id is None else self._registry.get(task_id)
-        if task_id is None or task is None or _is_long_over(task, now=now):
+        if task is None or _is_long_over(task, now=now):
             self._nonces.pop(key, None)
             return None
         if task.marks.payload != draft.marks.payload:
             raise reused(draft.marks.nonce)
-        return Known(task_id, Rule.NONCE)
+        return Known(task.id)
 
     def _forget_nonces(self) -> None:
         if len(self._nonces) > 2 * len(self._registry) + SPARE:  # most are of forgotten tasks
             kept = {k: t for k, t in self._nonces.items() if self._registry.get(t) is not None}
             self._nonces = kept
-
-    def _forget_old(self, *, now: float) -> None:
-        for submitter in [s for s, c in self._clients.items() if now - c.at > LONGEST]:
-            del self._clients[submitter]
 
 
 def reused(nonce: int) -> Rejection:
@@ -231,8 +185,7 @@ def reused(nonce: int) -> Rejection:
 
 def _is_long_over(task: Task, *, now: float) -> bool:
     """Return whether the nonce of a finished task may be used for a new submission."""
-    ended_at = task.submitted_at if task.changed_at is None else task.changed_at
-    return task.state in TERMINAL and now - ended_at > NONCE_KEPT
+    return task.state in TERMINAL and now - task.ended_at > NONCE_KEPT
 
 
 def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
@@ -245,19 +198,12 @@ def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:
         return False
     if (one.goal.yaw, one.goal.wait) != (other.goal.yaw, other.goal.wait):
         return False  # they do different things there
-    places = one.goal.place, other.goal.place
-    if None in places:
-        return places == (None, None)
-    if origin is None and LocalPlace in map(type, places) and GlobalPlace in map(type, places):
+    first, second = one.goal.place, other.goal.place
+    if first is None or second is None:
+        return first is second
+    if origin is None and isinstance(first, GlobalPlace) and isinstance(second, GlobalPlace):
+        origin = first
+    here, there = local_place(first, origin), local_place(second, origin)
+    if here is None or there is None:
         return False
-    first = _local(places[0], origin or places[0])
-    second = _local(places[1], origin or places[0])
-    return hypot(first.north - second.north, first.east - second.east) <= NEAR
-
-
-def _local(place: Place | None, origin: Place | None) -> LocalPlace:
-    if isinstance(place, GlobalPlace):
-        assert isinstance(origin, GlobalPlace), "a global place is compared in a known frame"
-        return to_local(place, origin)
-    assert isinstance(place, LocalPlace)
-    return place
+    return hypot(here.north - there.north, here.east - there.east) <= NEAR

@@ -1,6 +1,6 @@
 """Drives the active task of a vehicle while it is EXECUTING: path, arrival, fence, faults.
 
-It never changes the task's state: it returns the outcome, which the executor records.
+It never changes the task's state: it raises ``Becomes``, which the executor records.
 """
 
 from dataclasses import replace
@@ -30,7 +30,6 @@ from mav_tasks.tasks.driving.stage import (
     set_out,
 )
 from mav_tasks.tasks.driving.watches import AstrayWatch, Follows, StuckWatch
-from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.goal import (
     Face,
     GoTo,
@@ -56,11 +55,12 @@ KEEP_EACH = 1.0  # s between two writes of a driven task's progress
 SHARE_EACH = 0.5  # s between two estimates of how much of it is done; of a long plan they cost
 
 
-class Becomes(NamedTuple):
-    """Outcome for the driven task: its next state, and why."""
+class Becomes(Exception):
+    """The driven task is over or interrupted: its next state, and why."""
 
-    state: TaskState
-    reason: TaskReason = R.NONE
+    def __init__(self, state: TaskState, reason: TaskReason = R.NONE) -> None:
+        super().__init__(state, reason)
+        self.state, self.reason = state, reason
 
 
 class Tick(NamedTuple):
@@ -81,7 +81,7 @@ class Drive:
         self._registry = registry
         self._times = times
         self._bounds = bounds
-        self._settings = settings
+        self.settings = settings
         #: m/s, speed of tasks that are ``is_cruising``; None: the settings' speed
         self.cruise: float | None = None
         self._course: PathFollower | None = None
@@ -100,9 +100,6 @@ class Drive:
 
     def __repr__(self) -> str:
         return f"Drive({self._course!r}, {self._last_velocity})"
-
-    def apply(self, settings: Settings) -> None:
-        self._settings = settings
 
     def forget(self) -> None:
         """Drop the path of the active task: another task, or step, takes its place."""
@@ -123,23 +120,21 @@ class Drive:
             self._last_velocity = ZERO
             return demand
         self._last_velocity = limited(
-            demand.velocity, self._last_velocity, driving=self._settings.driving, elapsed=elapsed
+            demand.velocity, self._last_velocity, driving=self.settings.driving, elapsed=elapsed
         )
         if not self._last_velocity.is_zero:
             self._moved_at = now
         self._astray.commanded(self._last_velocity)
-        self._stuck.commanded(self._last_velocity, seconds=self._settings.watch.setpoint_period)
+        self._stuck.commanded(self._last_velocity, seconds=self.settings.watch.setpoint_period)
         return Demand(DemandKind.DRIVE, self._last_velocity)
 
-    def begin(
-        self, task: Task, seen: VehicleView, motion: Motion, *, now: float
-    ) -> Progress | Becomes:
+    def begin(self, task: Task, seen: VehicleView, motion: Motion, *, now: float) -> Progress:
         """Plan the path of a task that starts or resumes where the vehicle stands."""
         self._driven = task.progress.driven
         self._way_back = None
         here = self._set_out(Tick(task, seen, motion, now), task.progress)
         course = self._course
-        if isinstance(here, Becomes) or course is None:
+        if course is None:
             return here
         self._astray = AstrayWatch()
         if task.progress.anchor is not None:
@@ -152,10 +147,10 @@ class Drive:
             )
         return here
 
-    def _set_out(self, tick: Tick, progress: Progress) -> Progress | Becomes:
+    def _set_out(self, tick: Tick, progress: Progress) -> Progress:
         """Plan the path of a stage that begins here, if it can begin; without one, it waits."""
         task, seen, motion, now = tick
-        plan, driving = task.goal, self._settings.driving
+        plan, driving = task.goal, self.settings.driving
         goal = present_goal(plan, progress)
         if isinstance(goal, GoTo) and goal.place is None:
             progress, waits = self._before_return(tick, progress)
@@ -163,25 +158,23 @@ class Drive:
                 self._course = None
                 return progress
         if seen.turning is Turning.STEERED and isinstance(goal, Rotate | Face | MoveTurned):
-            return Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
+            raise Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
         course = set_out(goal, begun(plan, progress), seen, motion, self._bounds)
         if course is None:
-            return Becomes(S.PAUSED, R.POSITION_LOST)
+            raise Becomes(S.PAUSED, R.POSITION_LOST)
         here = course.progress
         if isinstance(goal, Wait):
             here = replace(here, done=waited(goal, here.done, utc=now + self._times.wall_offset))
             course.progress = here
         if (course.metres_to_place(motion) or 0.0) > driving.max_distance:
-            return Becomes(S.FAILED, R.BAD_PARAMETER)
-        if task.terms.max_distance is not None and (
-            end := self._end_of_way(tick, self._left(tick, here).metres)
-        ):
-            return end
+            raise Becomes(S.FAILED, R.BAD_PARAMETER)
+        if task.terms.max_distance is not None:
+            self._check_way(tick, self._left(tick, here).metres)
         metres = self._bounds.metres_to_leave(goal, here, motion.pose, seen.origin)
         if metres is not None:
             self._note(tick, f"would leave the fence in task {task.id} after {metres:.1f} m")
             is_new = task.progress.anchor is None and task.progress.step < 0
-            return Becomes(S.FAILED, R.OUTSIDE_FENCE) if is_new else Becomes(S.HELD, R.FENCE)
+            raise Becomes(S.FAILED, R.OUTSIDE_FENCE) if is_new else Becomes(S.HELD, R.FENCE)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         if isinstance(plan, Plan):
             lead_on(course, plan, seen, driving=driving)
@@ -200,15 +193,15 @@ class Drive:
         progress, waits = self._look_on_the_way(tick, progress, to_place=inf, elapsed=0.0)
         return progress, waits or tick.seen.is_home_old
 
-    def _end_of_way(self, tick: Tick, left: float) -> Becomes | None:
-        """Return the end of a task that drives farther than its submitter may, and say so."""
+    def _check_way(self, tick: Tick, left: float) -> None:
+        """End a task that drives farther than its submitter may, and say so."""
         task = tick.task
         most, way = task.terms.max_distance, self._driven + left
         if most is None or way <= most * CORRECTIONS + SLACK:
-            return None
+            return
         long = "unknown" if isnan(way) else f"{way:.1f} m"
         self._note(tick, f"task {task.id} may drive {most:g} m: its way is {long}")
-        return Becomes(S.FAILED, R.NOT_ALLOWED)
+        raise Becomes(S.FAILED, R.NOT_ALLOWED)
 
     def go_on(
         self,
@@ -219,12 +212,11 @@ class Drive:
         executed: float,
         elapsed: float,
         now: float,
-    ) -> Demand | Becomes:
-        """Return this tick's demand, or the outcome; ``executed`` is the s of EXECUTING so far."""
-        tick, watch = Tick(task, seen, motion, now), self._settings.watch
+    ) -> Demand:
+        """Return this tick's demand; ``executed`` is the s of EXECUTING so far."""
+        tick, watch = Tick(task, seen, motion, now), self.settings.watch
         self._driven += abs(self._last_velocity.forward) * elapsed
-        if end := self._end_of_way(tick, 0.0):
-            return end
+        self._check_way(tick, 0.0)
         if self._course is None:  # another step of a plan begins
             goal = goal_of(task)
             if not seen.still and not may_go_on_rolling(
@@ -244,10 +236,7 @@ class Drive:
                     tick, course.progress, to_place=course.metres_to_place(motion), elapsed=elapsed
                 )
             if course.has_passed(motion):
-                after = self._leave_step(task, task.goal, now=now)
-                if isinstance(after, Becomes):
-                    return after
-                self._registry.note_progress(task.id, after)
+                self._registry.note_progress(task.id, self._leave_step(task, task.goal, now=now))
                 self._course = None
                 return Demand(DemandKind.DRIVE, self._last_velocity)
         self._note_progress(tick, executed=executed)
@@ -258,7 +247,7 @@ class Drive:
             motion,
             self._last_velocity,
             stands=stands,
-            driving=self._settings.driving,
+            driving=self.settings.driving,
             now=now,
         ):
             if not stands and not isinstance(course.leg, Wait):
@@ -268,7 +257,7 @@ class Drive:
             self._stuck.begin(now=now)
             return view.STAND
         if self._stuck.is_stuck(course, seen, limit=watch.stuck, now=now):
-            return Becomes(S.FAILED, R.STUCK)
+            raise Becomes(S.FAILED, R.STUCK)
         news = self._follows.look(
             self._last_velocity, motion, seconds=watch.setpoint_period, now=now
         )
@@ -276,7 +265,7 @@ class Drive:
             self._note(tick, news)
         if self._astray.is_astray(course, motion):
             self._note(tick, "does not follow its setpoints: check its heading")
-            return Becomes(S.HELD, R.OFF_TRACK)
+            raise Becomes(S.HELD, R.OFF_TRACK)
         wish = course.steer(
             motion,
             driving=self._driving_of(task),
@@ -291,9 +280,9 @@ class Drive:
             if self._is_coming_back:  # from outside the fence it may drive in
                 return Demand(DemandKind.DRIVE, wish)
         fence = self._bounds.local(seen.origin)
-        velocity = within_fence(wish, motion, fence, driving=self._settings.driving, now=now)
+        velocity = within_fence(wish, motion, fence, driving=self.settings.driving, now=now)
         if velocity is None:
-            return Becomes(S.HELD, R.FENCE)
+            raise Becomes(S.HELD, R.FENCE)
         return Demand(DemandKind.DRIVE, velocity)
 
     def rest(self, task: Task, motion: Motion, *, now: float) -> None:
@@ -305,11 +294,11 @@ class Drive:
 
     def _note(self, tick: Tick, words: str) -> None:
         """Report a text about the vehicle of a task."""
-        self._registry.record(VehicleNoted(tick.task.vehicle, words, tick.now))
+        self._registry.note(tick.task.vehicle, words, now=tick.now)
 
     def _driving_of(self, task: Task) -> Driving:
         """Return the settings for a task; a task that is cruising has the vehicle's own speed."""
-        driving = self._settings.driving
+        driving = self.settings.driving
         if self.cruise is None or not task.terms.is_cruising:
             return driving
         return replace(driving, speed=min(self.cruise, driving.max_speed))
@@ -320,22 +309,21 @@ class Drive:
         self._follows.begin()
         self._arrival.begin_leg()
 
-    def _arrive(self, tick: Tick, course: PathFollower) -> Demand | Becomes | None:
+    def _arrive(self, tick: Tick, course: PathFollower) -> Demand | None:
         """End a leg: begin the next leg or step, leave the recovery path, or complete the task."""
         task, _, motion, now = tick
         self._begin_leg(now=now)
         if course.advance(motion):
             if (course.by_course or course.steering) and course.misses > MISSES:
-                return Becomes(S.FAILED, R.STUCK)
+                raise Becomes(S.FAILED, R.STUCK)
             if course is self._course:
                 self._registry.advance(task.id, course.progress, now=now)
         elif course is self._way_back:
             self._way_back = None
         elif not isinstance(task.goal, Plan):
-            return Becomes(S.COMPLETED)
+            raise Becomes(S.COMPLETED)
         elif not (is_over(task.goal, course.progress) and course.progress.pending):
-            after = self._leave_step(task, task.goal, now=now)
-            return after if isinstance(after, Becomes) else self._go_on(tick, after)
+            return self._go_on(tick, self._leave_step(task, task.goal, now=now))
         return None
 
     def _look_on_the_way(
@@ -352,23 +340,23 @@ class Drive:
             self._registry.advance(task.id, looked.progress, now=now)
         return looked.progress, looked.performs
 
-    def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
-        """End the current step. Return the progress of the next one, or COMPLETED."""
+    def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress:
+        """End the current step. Return the progress of the next one, if there is one."""
         assert self._course is not None, "a step is driven on its course"
         progress = self._course.progress
         if not is_over(plan, progress):
             self._registry.reached(task.id, progress.step, performs=False, now=now)
         left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
         after = following(plan, replace(progress, pending=left))  # unmet Near conditions lapse
-        return Becomes(S.COMPLETED) if after is None else after
+        if after is None:
+            raise Becomes(S.COMPLETED)
+        return after
 
-    def _go_on(self, tick: Tick, progress: Progress) -> Demand | Becomes | None:
+    def _go_on(self, tick: Tick, progress: Progress) -> Demand | None:
         """Begin the next step where the vehicle is, moving or not. Return why not, or None."""
         task_id = tick.task.id
         self._registry.note_progress(task_id, progress)  # in any case the last step is done
         here = self._set_out(tick, progress)
-        if isinstance(here, Becomes):
-            return here
         if self._course is None:
             self._registry.note_progress(task_id, here)
             return view.STAND

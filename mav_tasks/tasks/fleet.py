@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, QueuePaused
-from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, WORDS, LastHalt
+from mav_tasks.tasks.halts import WORDS, LastHalt
 from mav_tasks.tasks.lifecycle import ACTIVE, LOSSES, RUNNING, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
@@ -44,7 +44,7 @@ class Fleet:
             tasks = VehicleTasks(vehicle, self._registry, self.room, self._settings)
             self._of[vehicle] = tasks
             if self._comes_up_paused:
-                tasks.restore((), paused=R.RESTARTED, speed=None, uid="", now=self.began_at)
+                tasks.restore((), Restored(), paused=R.RESTARTED, now=self.began_at)
                 self._registry.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self.began_at))
         return tasks
 
@@ -76,10 +76,7 @@ class Fleet:
         """Forget a vehicle and its tasks, which are stored; return the ids of these."""
         self._of.pop(vehicle, None)
         self._was_driven.discard(vehicle)
-        self.room.forget(vehicle)
-        tasks = self._registry.forget(vehicle)
-        self.room.forgotten(now=now)
-        return tasks
+        return self.room.forget(vehicle, now=now)
 
     def apply(self, settings: Settings) -> None:
         self._settings = settings
@@ -91,12 +88,12 @@ class Fleet:
         """Load an earlier run: hold the tasks that ran, pause queues that must not go on alone."""
         if restored.gateway:
             self._registry.ids.share()
-            self.room.share()
+            self.room.is_shared = True
         else:
             self._registry.ids.count_from(restored.next_id)
         is_unclean = self._settings.on_restart == "pause" and not restored.ended_well
         self.began_at = now
-        self._load(restored, S.HELD, is_unclean=is_unclean, now=now)
+        self._load(restored, is_unclean=is_unclean, now=now)
         self._comes_up_paused = is_unclean  # for vehicles found from now on
 
     def take_over(self, restored: Restored, *, now: float) -> None:
@@ -105,80 +102,55 @@ class Fleet:
         The task that ran, or that waited for a link or a lease, is held, or resumes by itself, as
         the settings say.
         """
-        interrupted = S.PAUSED if self._settings.on_takeover == "resume" else S.HELD
-        self._load(restored, interrupted, is_unclean=False, is_elsewhere=True, now=now)
+        self._load(restored, is_unclean=False, is_elsewhere=True, now=now)
 
     def _load(
-        self,
-        restored: Restored,
-        interrupted: TaskState,
-        *,
-        is_unclean: bool,
-        is_elsewhere: bool = False,
-        now: float,
+        self, restored: Restored, *, is_unclean: bool, is_elsewhere: bool = False, now: float
     ) -> None:
-        """Load vehicles and their tasks; those that ran get the state ``interrupted``.
-
-        ``is_elsewhere``: another gateway had them.
-        """
+        """Load vehicles and their tasks. ``is_elsewhere``: another gateway had them."""
         self.room.set_wall_offset(restored.wall_offset, now=now)
         self._registry.restore(restored.tasks)
-        active: dict[int, list[Task]] = {}
+        of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.halt_epochs}
+        begun: dict[int, list[Task]] = {each: [] for each in of_note | restored.disarmed}
         waiting: set[int] = set()
         goes_on: set[TaskId] = set()  # alone, or when its turn comes again
         for task in restored.tasks:
+            is_lost = task.reason in LOSSES
             # one that stopped the vehicle at the end of its lease left it in our mode
-            if task.state in RUNNING or (is_elsewhere and task.reason in LOSSES):
+            if task.state in RUNNING or (is_elsewhere and is_lost):
                 self._was_driven.add(task.vehicle)
-                task = self._interrupted(task, interrupted, now=now)
+                task = self._interrupted(task, is_elsewhere=is_elsewhere, now=now)
                 if task.state is S.PAUSED:
                     goes_on.add(task.id)
-            elif is_elsewhere and task.state is S.PAUSED and task.reason is R.PREEMPTED:
+            elif task.state is S.PAUSED and is_elsewhere and task.reason is R.PREEMPTED:
                 goes_on.add(task.id)
-            elif (
-                task.state is S.PAUSED
-                and task.reason not in LOSSES
-                and not (restored.ended_well or task.vehicle in restored.paused)
+            elif task.state is S.PAUSED and not (
+                is_lost or restored.ended_well or task.vehicle in restored.paused
             ):
                 self._was_driven.add(task.vehicle)  # it was being taken, to resume this task
             if task.state in ACTIVE:
-                active.setdefault(task.vehicle, []).append(task)
+                begun.setdefault(task.vehicle, []).append(task)
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
-        pauses = self._settings.on_restart == "pause"
-        of_note = {*restored.paused, *restored.speeds, *restored.uids}
-        of_note |= restored.halt_epochs.keys() | restored.disarmed
-        for vehicle in active.keys() | waiting | of_note:
+        is_late = restored.idle > LONG_IDLE and self._settings.on_restart == "pause"
+        for vehicle in sorted(waiting.union(begun)):
+            tasks = begun.get(vehicle, [])
             paused = restored.paused.get(vehicle, R.NONE)
-            has_paused = any(
-                task.state is S.PAUSED and task.id not in goes_on
-                for task in active.get(vehicle, ())
-            )
-            is_late = restored.idle > LONG_IDLE and (vehicle in active or vehicle in waiting)
-            if not paused and (has_paused or is_unclean or (is_late and pauses)):
+            has_paused = any(task.state is S.PAUSED and task.id not in goes_on for task in tasks)
+            is_forgotten = is_late and (bool(tasks) or vehicle in waiting)
+            if not paused and (has_paused or is_unclean or is_forgotten):
                 paused = R.RESTARTED
                 self._registry.record(QueuePaused(vehicle, paused, SERVER, now))
-            halt = LastHalt(*restored.halted.get(vehicle, NOBODY))
-            self.of(vehicle).restore(
-                active.get(vehicle, ()),
-                paused=paused,
-                speed=restored.speeds.get(vehicle),
-                uid=restored.uids.get(vehicle, ""),
-                halt_epoch=restored.halt_epochs.get(vehicle, 1),
-                halt=halt if halt.reason in BY_SOMEBODY else NOBODY,
-                may_be_armed=vehicle not in restored.disarmed,
-                resuming=goes_on,
-                now=now,
-            )
-            if paused is R.STOPPED and halt.reason is R.STOPPED:
-                self.of(vehicle).was_stopped(at=halt.at, now=now)
+            self.of(vehicle).restore(tasks, restored, paused=paused, resuming=goes_on, now=now)
 
-    def _interrupted(self, task: Task, state: TaskState, *, now: float) -> Task:
-        if task.state is state:
-            return task
-        if task.state is S.CANCELLING or state is S.HELD:
+    def _interrupted(self, task: Task, *, is_elsewhere: bool, now: float) -> Task:
+        """Hold a task that ran, or pause it if it is to resume by itself here."""
+        resumes = is_elsewhere and self._settings.on_takeover == "resume"
+        if not resumes or task.state is S.CANCELLING:
             state, reason = S.HELD, R.OUTCOME_UNKNOWN
         else:
-            reason = R.LEASE_LOST
-        return self._registry.change(task.id, state, reason=reason, actor=SERVER, now=now)
+            state, reason = S.PAUSED, R.LEASE_LOST
+        if task.state is state:
+            return task
+        return self._registry.change(task.id, state, reason=reason, now=now)

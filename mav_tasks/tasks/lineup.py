@@ -1,29 +1,38 @@
-"""The tasks of one vehicle as they stand: queue, active and suspended tasks, and the pause.
+"""The tasks of one vehicle as they stand, and which of them comes next.
 
 The STOP latch is the queue's pause reason STOPPED: there is no second flag. One task at a time has
 the vehicle. Others may have started and be suspended: pre-empted, or held.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 from math import inf
+from typing import NamedTuple
 
 from mav_tasks.errors import Rejection
-from mav_tasks.settings import SET_FAILSAFE, Settings
+from mav_tasks.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.watches import LedAway
-from mav_tasks.tasks.events import QueuePaused, VehicleHalted
+from mav_tasks.tasks.driving.limits import safe_braking
+from mav_tasks.tasks.driving.mission_sequencer import goal_of
+from mav_tasks.tasks.driving.watches import JumpWatch, LedAway
+from mav_tasks.tasks.events import (
+    SERVER,
+    QueuePaused,
+    TaskWaits,
+    VehicleArmingSet,
+    VehicleHalted,
+    VehicleIdentified,
+    VehicleSpeedSet,
+)
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import SingleGoal
 from mav_tasks.tasks.halts import DISABLED, Halts
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks
-from mav_tasks.tasks.queue import TaskQueue
+from mav_tasks.tasks.queue import TaskQueue, outranks
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Task, TaskId, same_frame
 from mav_tasks.tasks.timing import Timing
-from mav_tasks.tasks.vehicle_terms import VehicleTerms
-from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.view import VehicleView, start_blocker
 
 R, S = TaskReason, TaskState
 
@@ -33,10 +42,10 @@ WAYS_OUT = {
     R.DISARMED: "disarmed, arm it or press Continue",
     R.LOSS_FAILSAFE: f"it might drive on without setpoints, {SET_FAILSAFE}",
 }
+LEAVES_MODE = 1.5  # s in which a heartbeat shows the mode that was asked for with a task
 
 
-@dataclass(frozen=True, slots=True)
-class Released:
+class Released(NamedTuple):
     """A held task that a person has released, and that waits for the vehicle or the queue."""
 
     task_id: TaskId
@@ -63,8 +72,6 @@ class Lineup:
         #: its fence, rally points and home
         self.bounds = Bounds()
         self.executor = Executor(registry, settings, self.bounds, room.times)
-        #: values of the vehicle that hold for all its tasks
-        self.terms = VehicleTerms(vehicle, registry, self.executor, settings)
         #: how many tasks of a submitter's owner wait, on any vehicle
         self.count_of = room.count_of
         #: add a task; raise Rejection if too many wait
@@ -82,9 +89,21 @@ class Lineup:
         self.immediate: TaskId | None = None
         #: a task was killed: nothing starts before the vehicle stands, or a takeover
         self.stopping_after_kill = False
-        self.begun_at = 0.0
         #: a held task that waits until the vehicle has rebooted, or the queue resumes
         self.last_released: Released | None = None
+        #: the vehicle at the last step
+        self.seen: VehicleView | None = None
+        self._jumps = JumpWatch()
+        #: the unique id of the vehicle of these tasks, "" until it was heard
+        self.uid = ""
+        #: no person has disarmed it, or one has allowed arming since
+        self.may_be_armed = True
+        self._speed: float | None = None  # m/s, of goals that name none; None: the settings' one
+        self._cruise: float | None = None  # m/s, the vehicle's own cruise speed
+        self._stop: tuple[float, float] | None = None  # m/s and m of a measured stop
+        self._begun_at = 0.0
+        self._blocked = -1, R.NONE  # the next task, and why it does not start
+        self._told_at = inf  # s, when that is recorded
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vehicle}, {self.queue!r}, {self.paused.name})"
@@ -101,6 +120,12 @@ class Lineup:
         return [self.registry[task_id] for task_id in self.suspended_ids]
 
     @property
+    def begun(self) -> list[Task]:
+        """The tasks that have started and are not over: the active one first."""
+        active = self.active
+        return self.suspended if active is None else [active, *self.suspended]
+
+    @property
     def released(self) -> Released | None:
         """The last release, while its task waits and nothing has halted the vehicle since."""
         last = self.last_released
@@ -109,7 +134,7 @@ class Lineup:
     @property
     def is_driving(self) -> bool:
         """Whether any task has started and is not over."""
-        return self.active is not None or bool(self.suspended_ids)
+        return self.executor.task_id is not None or bool(self.suspended_ids)
 
     @property
     def is_stopped(self) -> bool:
@@ -134,11 +159,8 @@ class Lineup:
     @property
     def unfinished(self) -> list[Task]:
         """All tasks that are not over, in the order of their ids."""
-        active = [] if self.active is None else [self.active.id]
-        return [
-            self.registry[task_id]
-            for task_id in sorted([*active, *self.suspended_ids, *self.waiting])
-        ]
+        tasks = self.begun + [self.registry[task_id] for task_id in self.waiting]
+        return sorted(tasks, key=lambda task: task.id)
 
     def page(self, first: int, count: int) -> list[TaskId]:
         """Return up to ``count`` waiting tasks from a position on."""
@@ -154,38 +176,92 @@ class Lineup:
 
     def timing_of(self, task: Task) -> Timing | None:
         """Return a task's setpoint timing, None if it was not driven."""
-        active = self.active
-        return self.executor.timing if active is not None and active.id == task.id else task.timing
+        return self.executor.timing if self.executor.task_id == task.id else task.timing
 
     @property
     def held(self) -> Task | None:
         """The held task that needs a decision; None without one, or once it is released."""
-        active = self.active
-        if active is not None and active.state is S.HELD:
-            return active if self.released is None else None
-        return next((task for task in self.suspended if task.state is S.HELD), None)
+        held = next((task for task in self.begun if task.state is S.HELD), None)
+        is_active = held is not None and held.id == self.executor.task_id
+        return None if is_active and self.released is not None else held
 
     @property
     def is_held_ahead(self) -> bool:
         """Whether a held task keeps all others from starting."""
-        active = self.active
-        if active is not None and active.state is S.HELD:
-            return True
-        return any(task.state is S.HELD for task in self.suspended)
+        return any(task.state is S.HELD for task in self.begun)
 
-    # shared by several parts
+    # values of the vehicle that hold for all its tasks
 
-    def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
+    def apply(self, settings: Settings) -> None:
+        self.settings = settings
+        self._apply_driving()
+
+    def _apply_driving(self) -> None:
+        self.executor.apply(replace(self.settings, driving=self.driving))
+        self.executor.drive.cruise = self._cruise if self._speed is None else None
+
+    @property
+    def driving(self) -> Driving:
+        """Driving settings, with the speed set by a client, and the measured braking."""
+        driving = self.settings.driving
+        if self._stop is not None:
+            driving = replace(driving, acceleration=safe_braking(driving, *self._stop))
+        return driving if self._speed is None else replace(driving, speed=self._speed)
+
+    def cruises(self, speed: float | None) -> None:
+        """Note the vehicle's own cruise speed, m/s; None: unknown."""
+        if speed != self._cruise:
+            self._cruise = speed
+            self._apply_driving()
+
+    def brakes(self, stop: tuple[float, float] | None) -> None:
+        """Note a measured stop: the speed in m/s and the metres that it took; None: unknown."""
+        if stop != self._stop:
+            self._stop = stop
+            self._apply_driving()
+
+    def let_arm(self, *, may_be_armed: bool, now: float) -> None:
+        """Set whether the vehicle may be armed; a person who disarms it forbids that. Store it."""
+        if may_be_armed != self.may_be_armed:
+            self.may_be_armed = may_be_armed
+            self.registry.record(VehicleArmingSet(self.vehicle, may_be_armed, now))
+
+    def is_another(self, uid: str, *, now: float) -> bool:
+        """Note the reported unique id. Return whether it is another vehicle than the tasks' own.
+
+        A vehicle that does not know its id reports "", which changes nothing.
+        """
+        if not uid or uid == self.uid:
+            return False
+        before, self.uid = self.uid, uid
+        self.registry.record(VehicleIdentified(self.vehicle, uid, now))
+        return bool(before)
+
+    def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
+        """Set the speed of the active task, and of later goals that name none.
+
+        Return the active task's id, or None.
+        """
+        if speed != self._speed:
+            self.registry.record(VehicleSpeedSet(self.vehicle, speed, actor, now))
+        self._speed = speed
+        self._apply_driving()
+        self.executor.set_speed(speed)
+        return self.executor.task_id
+
+    # halts
+
+    def halt(self, reason: TaskReason, *, actor: str = SERVER, now: float) -> None:
         """Record a halt of the vehicle; a request to resume must be newer.
 
         An immediate task that has not started becomes an ordinary waiting one.
         """
-        if self.immediate is not None and (self.active is None or self.active.id != self.immediate):
+        if self.immediate != self.executor.task_id:
             self.immediate = None
         if self.halts.raise_epoch(reason, actor=actor, now=now):
             self.registry.record(VehicleHalted(self.vehicle, self.halts.epoch, reason, actor, now))
 
-    def pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
+    def pause_queue(self, reason: TaskReason, *, actor: str = SERVER, now: float) -> None:
         """Pause the queue; this undoes neither a STOP nor a takeover."""
         if self.paused in (reason, R.STOPPED):
             return
@@ -193,11 +269,6 @@ class Lineup:
             return  # a pause does not say that the vehicle is ours again
         self.paused = reason
         self.registry.record(QueuePaused(self.vehicle, reason, actor, now))
-
-    def set_aside(self, task_id: TaskId) -> None:
-        """Suspend the active task, so that another one can have the vehicle."""
-        self.executor.give_up()
-        self.suspended_ids[task_id] = None
 
     def keeps(self, task: Task) -> bool:
         """Return whether a waiting task stays with this vehicle because somebody has halted it.
@@ -208,6 +279,8 @@ class Lineup:
         if reason is R.TAKEOVER and self.paused is R.FAILSAFE:
             at = -inf
         return at >= task.submitted_at or (bool(self.paused) and self.paused not in DISABLED)
+
+    # whose turn it is
 
     def blocker(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> TaskReason:
         """Return why no task with this goal can take control of the vehicle now, or NONE."""
@@ -225,3 +298,105 @@ class Lineup:
             and task.progress.anchor is not None
             and not same_frame(task.progress.frame, seen.frame)
         )
+
+    @property
+    def awaits_commit(self) -> bool:
+        """Whether there is a next task whose submission is not durable yet."""
+        first = None if self.executor.task_id is not None else self.next_id
+        return first is not None and not self.registry.is_durable(first)
+
+    def blocker_of(self, task_id: TaskId) -> TaskReason:
+        """Return what blocks the next, an active or a released task; NONE for others."""
+        if self.released is not None and self.released.task_id == task_id:
+            return self.released.waits_for
+        if self.executor.task_id == task_id:
+            return self.executor.waits_for[0]
+        return self._blocked[1] if self._blocked[0] == task_id else R.NONE
+
+    def words_of_blocker(self, task_id: TaskId) -> str:
+        """Return the vehicle's own words for what blocks an active task, or ""."""
+        return self.executor.waits_for[1] if self.executor.task_id == task_id else ""
+
+    @property
+    def next_id(self) -> TaskId | None:
+        """The next task to start: the immediate one, a pre-empted one, or a waiting one."""
+        immediate = self.immediate
+        if immediate is not None and (immediate in self.queue or immediate in self.suspended_ids):
+            return immediate
+        if self.paused or self.is_held_ahead:
+            return None
+        first = self.queue.first()
+        if not self.suspended_ids:
+            return first
+        best = min(self.suspended, key=self.room.rank)  # all of them are paused: none is held
+        if first is not None and self.queue.rank(first) < self.room.rank(best):
+            return first
+        return best.id
+
+    def set_aside(self, task_id: TaskId) -> None:
+        """Suspend the active task, so that another one can have the vehicle."""
+        self.executor.give_up()
+        self.suspended_ids[task_id] = None
+
+    def is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
+        """Let a waiting task pre-empt the running one, if it may and can start. Return whether."""
+        running, queueing = self.active, self.settings.queueing
+        if running is None or self.paused or not self.queue or self.is_held_ahead:
+            return False
+        if now - self._begun_at < queueing.preemption_rest:
+            return False
+        for task_id in self.queue.interrupters():
+            waiting = self.registry[task_id]
+            is_too_late = self.room.times.is_too_late(waiting, now=now)
+            if not self.registry.is_durable(task_id) or is_too_late:
+                continue
+            outranked = outranks(waiting, running, queueing=queueing)
+            if outranked and not self.blocker(seen, goal_of(waiting), now=now):
+                self.executor.pause(R.PREEMPTED, now=now)
+                self.set_aside(running.id)
+                self._begin(waiting, seen, now=now)
+                return True
+        return False
+
+    def begin_next(self, seen: VehicleView, *, now: float) -> None:
+        """Start the next task, if it can start."""
+        first = None if self.executor.task_id is not None else self.next_id
+        if first is None:
+            return
+        task = self.registry[first]
+        if task.state is S.QUEUED and self.room.times.is_too_late(task, now=now):
+            self.room.handle_deadline(now=now)  # after a delay this may precede its timer
+            self.begin_next(seen, now=now)
+            return
+        blocker = self.blocker(seen, goal_of(task), now=now)
+        self._note_blocker(first, blocker, now=now)
+        if not blocker and self.registry.is_durable(first):
+            self._begin(task, seen, now=now)
+
+    def _begin(self, task: Task, seen: VehicleView, *, now: float) -> None:
+        if task.state is S.QUEUED:
+            self.room.leave(task)
+        else:
+            del self.suspended_ids[task.id]
+        self._begun_at = now
+        if self.is_of_another_frame(task, seen):
+            lost = R.FRAME_RESET
+        else:
+            lost = R.OFF_TRACK if self.displaced.from_line_of(task, seen) else R.NONE
+        if lost:
+            self.executor.adopt(task)
+            self.executor.hold(lost, now=now)
+        else:
+            self.executor.begin(task, now=now)
+
+    def _note_blocker(self, first: TaskId, blocker: TaskReason, *, now: float) -> None:
+        """Note why the next task does not start, and record it each time that it changes."""
+        if (first, blocker) != self._blocked:
+            self._told_at = now + (LEAVES_MODE if blocker is R.WRONG_MODE else 0.0)
+        self._blocked = first, blocker
+        if blocker and now >= self._told_at:
+            self._told_at = inf
+            self._tell_wait(first, blocker, now=now)
+
+    def _tell_wait(self, task_id: TaskId, reason: TaskReason, *, now: float) -> None:
+        self.registry.record(TaskWaits(task_id, self.vehicle, reason, now))

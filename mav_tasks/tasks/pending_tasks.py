@@ -3,9 +3,19 @@
 One object holds them all, because a task can depend on a task of another vehicle. A ready task is
 in its vehicle's queue. A task inherits the rank of the most urgent task that depends on it,
 directly or through others.
+
+In a fleet a task may run after one of a vehicle that another gateway has. The registry lacks that
+one; the fleet's store says how it stands, and ``expected`` are the tasks that it is asked about. A
+task that the registry lacks counts as not over until the store says that it is: whoever has lost
+sight of a task must not start what waits for it. What the store says never turns back: a task is
+there, and later it has ended.
+
+Dependencies have no circle. A new task may name only one that exists, so none waits for it yet. A
+waiting task may be changed to run after another one only if all that this one waits for is known
+here: the gateways have nothing in common that could find a circle over several of them.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -13,8 +23,7 @@ from dataclasses import dataclass, replace
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.cron import utc_text
-from mav_tasks.tasks.dependencies import Dependencies
-from mav_tasks.tasks.events import SERVER, VehicleNoted
+from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
 from mav_tasks.tasks.registry import TaskRegistry
@@ -49,13 +58,19 @@ class PendingTasks:
         self._settings = settings
         self._waiters: dict[TaskId, _Waiter] = {}
         self._queues: dict[int, TaskQueue] = defaultdict(TaskQueue)
-        self._of_vehicle: dict[int, int] = {}  # how many wait
-        self._of_owner: dict[str, int] = {}
-        self._dependencies = Dependencies(registry)
+        self._of_owner = Counter[str]()  # how many wait
+        #: for each task, those that run after it, in the order in which they were added
+        self._dependents: dict[int, dict[TaskId, None]] = {}
         #: start times and deadlines
         self.times = Times()
         #: the vehicles whose tasks became ready or left since ``take_woken``
         self.woken: set[int] = set()
+        #: whether tasks that the registry lacks may be another gateway's
+        self.is_shared = False
+        #: the tasks with dependents that the registry lacks: the fleet's store knows them
+        self.expected: set[int] = set()
+        #: what the fleet's store says, while that is handled; None: there is no such task
+        self._told: Mapping[int, TaskState | None] = {}
 
     def __repr__(self) -> str:
         return f"PendingTasks({len(self._waiters)} tasks)"
@@ -64,43 +79,38 @@ class PendingTasks:
         """Apply new settings; tasks that already wait keep their order."""
         self._settings = settings
 
-    def share(self) -> None:
-        """Take that tasks may run after those of other gateways' vehicles."""
-        self._dependencies.is_shared = True
-
     def queue(self, vehicle: int) -> TaskQueue:
         """Return the queue of a vehicle's ready tasks."""
         return self._queues[vehicle]
 
     def count(self, vehicle: int) -> int:
         """Return how many tasks of a vehicle wait, ready or not."""
-        return self._of_vehicle.get(vehicle, 0)
+        return self._registry.count_waiting(vehicle)
 
     def count_of(self, submitter: Submitter) -> int:
         """Return how many tasks of a submitter's owner wait."""
-        return self._of_owner.get(submitter.owner, 0)
+        return self._of_owner[submitter.owner]
 
     def of(self, vehicle: int) -> list[TaskId]:
         """Return all waiting tasks of a vehicle: the ready ones in order, then the others."""
-        ready = self.queue(vehicle).in_order()
-        if len(ready) == self.count(vehicle):
-            return ready
+        queue = self._queues[vehicle]
+        if len(queue) == self.count(vehicle):
+            return queue.in_order()
 
         def due_or_rank(task_id: TaskId) -> tuple[float, Rank]:
             return self.times.start(self._registry[task_id].terms), self._waiters[task_id].rank
 
-        others = [
-            task_id
-            for task_id in self._waiters
-            if self._registry[task_id].vehicle == vehicle and task_id not in self.queue(vehicle)
-        ]
-        return ready + sorted(others, key=due_or_rank)
+        others = [each for each in self._of_vehicle(vehicle) if each not in queue]
+        return queue.in_order() + sorted(others, key=due_or_rank)
+
+    def _of_vehicle(self, vehicle: int) -> list[TaskId]:
+        return [each for each in self._waiters if self._registry[each].vehicle == vehicle]
 
     def rank(self, task: Task) -> Rank:
         """Return a task's rank among the ready ones; for an active task, the rank it would have."""
         if waiter := self._waiters.get(task.id):
             return waiter.rank
-        return self._most_urgent(task.id, _own_rank(self._settings, task, task.submitted_at))
+        return self._most_urgent(task.id, self._own_rank(task, task.submitted_at))
 
     def take_woken(self) -> set[int]:
         """Return the vehicles whose tasks became ready or left since the last call."""
@@ -112,69 +122,56 @@ class PendingTasks:
     def submit(self, draft: Draft, *, now: float) -> Task:
         """Add a new task. Raise Rejection at a limit, or if its dependency cannot complete."""
         queueing = self._settings.queueing
-        if self._of_vehicle.get(draft.vehicle, 0) >= queueing.capacity:
+        if self._registry.count_waiting(draft.vehicle) >= queueing.capacity:
             raise Rejection(R.QUEUE_FULL, f"queue full: {queueing.capacity} tasks wait")
-        if self._of_owner.get(draft.submitter.owner, 0) >= queueing.quota:
+        if self._of_owner[draft.submitter.owner] >= queueing.quota:
             raise Rejection(R.QUOTA, f"quota: this client has {queueing.quota} waiting tasks")
         if draft.terms.after:
-            self._dependencies.check(draft.terms.after)
+            self._check(draft.terms.after)
         return self._add(draft, now=now)
 
     def _add(self, draft: Draft, *, now: float) -> Task:
-        is_met = self._dependencies.has_completed(draft.terms.after)
+        after = draft.terms.after
+        is_met = bool(after) and self._stands(after) is S.COMPLETED
         state = self._state_by(draft.terms, is_met=is_met, now=now)
         task = self._registry.submit(draft, state=state, now=now)
-        self._enter(task, draft.submitter.owner, now=now)
+        self._enter(task, now=now)
         if state is S.QUEUED:  # wakes nobody: it is not durable yet
             self._line_up(task)
         return task
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Add those tasks of an earlier run that were waiting."""
-        waiting = [task for task in tasks if task.state in WAITING]
-        waiting = [self._moved_on(task, now=now) for task in waiting]
+        waiting = [self._moved_on(task, now=now) for task in tasks if task.state in WAITING]
         for task in waiting:
             due = self.times.start(task.terms)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
-            self._enter(task, task.submitter.owner, now=came_at)
-            if task.id in self._dependencies:  # a modification may have put dependents first
+            self._enter(task, now=came_at)
+            if task.id in self._dependents:  # a modification may have put dependents first
                 self._lift(task.id)
         ready: dict[int, list[Entry]] = {}
-        others: list[Task] = []
         for task in waiting:
             if task.state is S.QUEUED and self._wanted(task, now=now) is S.QUEUED:
                 ready.setdefault(task.vehicle, []).append(self._entry(task))
-            else:
-                others.append(task)
         for vehicle, entries in ready.items():
-            self.queue(vehicle).put_all(entries)
-        for task in others:
-            if task.id not in self._waiters or task.id in self.queue(task.vehicle):
+            self._queues[vehicle].put_all(entries)
+        for task in waiting:
+            if task.id not in self._waiters or task.id in self._queues[task.vehicle]:
                 continue
-            if self._dependencies.have_failed(task):  # failure was stored, its consequence was not
-                self._fail(task.id, now=now)
-                self.ended(task.id, now=now)
+            if self._has_failed(task.terms.after):  # that was stored, its consequence was not
+                self.end(task, S.FAILED, R.DEPENDENCY_FAILED, now=now)
             else:
                 self._settle(task, now=now)
         self._look_again(now=now)
 
-    def _enter(self, task: Task, owner: str, *, now: float) -> None:
-        own = _own_rank(self._settings, task, now)
+    def _enter(self, task: Task, *, now: float) -> None:
+        own = self._own_rank(task, now)
         self._waiters[task.id] = _Waiter(now, own, own)
-        self._of_vehicle[task.vehicle] = self._of_vehicle.get(task.vehicle, 0) + 1
-        self._of_owner[owner] = self._of_owner.get(owner, 0) + 1
+        self._of_owner[task.submitter.owner] += 1
         self.times.note(task)
         if task.terms.after:
             self._depend(task)
             self._lift(task.id)
-
-    def _depend(self, task: Task) -> None:
-        """Note what a waiting task runs after, unless that has completed."""
-        after, known = task.terms.after, self._dependencies
-        is_met = known.has_completed(after) or known.was_met(task)
-        self._waiters[task.id].is_met = is_met
-        if after and not is_met:
-            known.add(task.id, after)
 
     # changes of state
 
@@ -186,16 +183,15 @@ class PendingTasks:
             wanted = self._wanted(task, now=now)
             self.times.note(task)
         if task.state is S.SCHEDULED and wanted is not S.SCHEDULED:
-            waiter = self._waiters[task.id]
-            waiter.came_at = max(waiter.came_at, self.times.start(task.terms))
-            self._rerank(task)
+            came_at = self._waiters[task.id].came_at
+            self._rerank(task, came_at=max(came_at, self.times.start(task.terms)))
         if task.state is not wanted:
-            task = self._registry.change(task.id, wanted, reason=R.NONE, actor=SERVER, now=now)
+            task = self._registry.change(task.id, wanted, now=now)
         if wanted is S.QUEUED:
             self._line_up(task)
             self.woken.add(task.vehicle)
         else:
-            self.queue(task.vehicle).discard(task.id)
+            self._queues[task.vehicle].discard(task.id)
         return task
 
     def _line_up(self, task: Task) -> None:
@@ -209,27 +205,31 @@ class PendingTasks:
         return self._state_by(task.terms, is_met=self._waiters[task.id].is_met, now=now)
 
     def _state_by(self, terms: Terms, *, is_met: bool, now: float) -> TaskState:
-        has_start = terms.start_at is not None or terms.start_utc is not None
-        if has_start and self.times.start(terms) > now:
+        if self.times.start(terms) > now:
             return S.SCHEDULED
-        after = 0 if is_met else terms.after
-        if terms.is_staged or (after and self._dependencies.is_waited_for(after)):
+        if terms.is_staged or (terms.after and not is_met and self._is_waited_for(terms.after)):
             return S.BLOCKED
         return S.QUEUED
 
     def handle_deadline(self, *, now: float) -> None:
         """Expire tasks whose deadline has passed, and settle those whose start time has come."""
-        for task_id in self.times.deadlines.take(now=now):
-            if task := self._waiting(task_id):
-                self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
-        for task_id in self.times.starts.take(now=now):
-            self._settle(self._registry[task_id], now=now)
+        due = [self._registry[task_id] for task_id in self.times.take(now=now)]
+        late = [task for task in due if self.times.is_too_late(task, now=now)]
+        for task in late:
+            if task.id in self._waiters:
+                self.end(task, S.EXPIRED, R.DEADLINE, now=now)
+        for task in due:
+            if task.id in self._waiters:
+                self.times.started(task)
+                self._settle(self._registry[task.id], now=now)
 
     def set_wall_offset(self, offset: float, *, now: float) -> None:
         """Set UTC minus monotonic time, s; this moves the tasks that start at a UTC time."""
         waiting = [self._registry[task_id] for task_id in self._waiters]
         is_corrected = self.times.wall_offset - offset > CORRECTION
-        self.times.set_wall_offset(offset, waiting)
+        self.times.wall_offset = offset
+        for task in waiting:
+            self.times.note(task)
         if is_corrected:
             waiting = [self._brought_forward(task, now=now) for task in waiting]
         for task in waiting:
@@ -238,27 +238,25 @@ class PendingTasks:
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change the terms of a waiting task. Raise Rejection if its dependency cannot complete."""
-        if terms.after and terms.after != task.terms.after:
-            self._dependencies.check_here(terms.after)
-            self._dependencies.check_cycle(task, terms.after)
-        before = task.terms.after
+        before, after = task.terms.after, terms.after
+        if after and after != before:
+            self._check_change(task, after)
+        came_at = self._waiters[task.id].came_at
         if task.terms.is_staged and not terms.is_staged:
-            self._waiters[task.id].came_at = now  # it has not competed with others until now
+            came_at = now  # it has not competed with others until now
         task = self._registry.modify(task.id, terms, actor=actor, now=now)
         self.times.note(task)
-        if before != terms.after:
+        if before != after:
             self._part(task.id, before)
             self._depend(task)
-        self._rerank(task)
-        self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
+        self._rerank(task, came_at=came_at)
+        self._queues[task.vehicle].discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
 
     def assign(self, task: Task, vehicle: int, *, choice: str, now: float) -> None:
         """Give a waiting task to another vehicle, in whose queue it keeps its rank."""
-        is_ready = task.id in self.queue(task.vehicle)
-        self.queue(task.vehicle).discard(task.id)
-        self._of_vehicle[task.vehicle] -= 1
-        self._of_vehicle[vehicle] = self._of_vehicle.get(vehicle, 0) + 1
+        is_ready = task.id in self._queues[task.vehicle]
+        self._queues[task.vehicle].discard(task.id)
         self.woken |= {task.vehicle, vehicle}
         task = self._registry.assign(task.id, vehicle, choice=choice, now=now)
         if is_ready:
@@ -285,7 +283,7 @@ class PendingTasks:
         run = None if why_not else next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
         if run is None:
             why_not = why_not or "it has no further time"
-            self._note(task, f"will not repeat task {task.id}: {why_not}", now=now)
+            self._registry.note(task.vehicle, f"will not repeat task {task.id}: {why_not}", now=now)
             return True
         terms = replace(run.terms, after=0, is_staged=False, place=None)
         draft = Draft(
@@ -298,7 +296,7 @@ class PendingTasks:
         if run.left_out:
             words = f"left out {left_out_words(run.left_out, terms.repeat)}"
             words += f" while task {task.id} waited or ran; task {added.id} is next"
-            self._note(task, words, now=now)
+            self._registry.note(task.vehicle, words, now=now)
         return True
 
     def _moved_on(self, task: Task, *, now: float) -> Task:
@@ -312,12 +310,11 @@ class PendingTasks:
         run = next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
         if run is None or not run.left_out:
             return task
-        words = (
-            f"left out {left_out_words(1 + run.left_out, run.terms.repeat)} that passed meanwhile"
-        )
-        task = self._registry.modify(task.id, run.terms, actor=SERVER, now=now)
+        task = self._registry.modify(task.id, run.terms, now=now)
         at = utc_text(self.times.start(task.terms) + self.times.wall_offset)
-        self._note(task, f"{words}; task {task.id} starts {at}", now=now)
+        words = f"left out {left_out_words(1 + run.left_out, run.terms.repeat)}"
+        words += f" that passed meanwhile; task {task.id} starts {at}"
+        self._registry.note(task.vehicle, words, now=now)
         return task
 
     def _brought_forward(self, task: Task, *, now: float) -> Task:
@@ -327,56 +324,46 @@ class PendingTasks:
             terms = brought_forward(terms, utc=now + self.times.wall_offset)
         if terms is task.terms:
             return task
-        task = self._registry.modify(task.id, terms, actor=SERVER, now=now)
+        task = self._registry.modify(task.id, terms, now=now)
         self.times.note(task)
         return task
-
-    def _note(self, task: Task, words: str, *, now: float) -> None:
-        self._registry.record(VehicleNoted(task.vehicle, words, now))
 
     # removal
 
     def leave(self, task: Task) -> None:
         """Remove a task that starts or ends."""
         del self._waiters[task.id]
-        self.times.forget((task.id,))
-        self.queue(task.vehicle).discard(task.id)
-        self._of_vehicle[task.vehicle] -= 1
-        self._leave_owner(task.submitter.owner)
+        self.times.forget(task.id)
+        self._queues[task.vehicle].discard(task.id)
+        owner = task.submitter.owner
+        self._of_owner[owner] -= 1
+        if not self._of_owner[owner]:
+            del self._of_owner[owner]
         self._part(task.id, task.terms.after)
         self.woken.add(task.vehicle)
 
-    def forget(self, vehicle: int) -> None:
-        """Forget the waiting tasks of a vehicle, without ending them; call ``forgotten`` later."""
-        gone = [each for each in self._waiters if self._registry[each].vehicle == vehicle]
-        for task_id in gone:
-            del self._waiters[task_id]
-            task = self._registry[task_id]
-            self._leave_owner(task.submitter.owner)
-            self._part(task_id, task.terms.after)
-        self.times.forget(gone)
+    def forget(self, vehicle: int, *, now: float) -> set[TaskId]:
+        """Forget all tasks of a vehicle, without ending them; return their ids."""
+        for task_id in self._of_vehicle(vehicle):
+            self.leave(self._registry[task_id])
         self._queues.pop(vehicle, None)
-        self._of_vehicle.pop(vehicle, None)
         self.woken.discard(vehicle)
-
-    def forgotten(self, *, now: float) -> None:
-        """Take that the registry has forgotten the tasks of a vehicle."""
+        gone = self._registry.forget(vehicle)
         self._look_again(now=now)
-
-    def _leave_owner(self, owner: str) -> None:
-        left = self._of_owner[owner] - 1
-        if left:
-            self._of_owner[owner] = left
-        else:
-            del self._of_owner[owner]
+        return gone
 
     def end(
-        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
+        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str = SERVER, now: float
     ) -> None:
         """End a waiting task, and fail its dependents."""
+        self._end(task, state, reason, actor=actor, now=now)
+        self.ended(task.id, now=now)
+
+    def _end(
+        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str = SERVER, now: float
+    ) -> None:
         self.leave(task)
         self._registry.change(task.id, state, reason=reason, actor=actor, now=now)
-        self.ended(task.id, now=now)
 
     def withdraw(self, task: Task, *, now: float) -> None:
         """Withdraw a submission that did not become durable, and fail its dependents."""
@@ -386,46 +373,110 @@ class PendingTasks:
 
     def clear(self, vehicle: int, reason: TaskReason, *, actor: str, now: float) -> None:
         """Cancel all waiting tasks of a vehicle."""
-        cleared = [self._registry[task_id] for task_id in self.of(vehicle)]
-        for task in cleared:  # cancel all first, so that no dependent among them fails
-            self.leave(task)
-            self._registry.change(task.id, S.CANCELLED, reason=reason, actor=actor, now=now)
-        for task in cleared:
-            self.ended(task.id, now=now)
+        cleared = self.of(vehicle)
+        for task_id in cleared:  # cancel all first, so that no dependent among them fails
+            self._end(self._registry[task_id], S.CANCELLED, reason, actor=actor, now=now)
+        for task_id in cleared:
+            self.ended(task_id, now=now)
 
     def ended(self, task_id: TaskId, *, now: float) -> None:
         """Settle the dependents of a task that completed, or fail those of a task that did not."""
         if ended := self._registry.get(task_id):
             self._part_all(task_id, completed=ended.state is S.COMPLETED, now=now)
 
-    def _part_all(self, task_id: TaskId, *, completed: bool, now: float) -> None:
-        """Settle the dependents of a task that is over, or fail them and their dependents."""
-        over = [task_id]
-        while over:
-            for dependent in self._dependencies.take(over.pop()):
-                if completed:
-                    self._waiters[dependent].is_met = True
-                    self._settle(self._registry[dependent], now=now)
-                else:
-                    self._fail(dependent, now=now)
-                    over.append(dependent)
+    # dependencies
 
-    # tasks of vehicles that other gateways have
+    def _stands(self, after: int) -> TaskState | None:
+        """Return the state of a task as far as it is known, here or by the fleet's store."""
+        task = self._registry.get(after)
+        return self._told.get(after) if task is None else task.state
 
-    @property
-    def expected(self) -> set[int]:
-        """The tasks that ours run after and that are not ours: the fleet's store knows them."""
-        return self._dependencies.expected
+    def _has_failed(self, after: int) -> bool:
+        """Return whether a task is known to have ended without being completed."""
+        state = self._stands(after)
+        return state is not S.COMPLETED and state in TERMINAL
 
-    def is_in_question(self, task_id: int) -> bool:
+    def _is_waited_for(self, after: int) -> bool:
+        """Return whether a task is not over, as far as is known."""
+        state = self._stands(after)
+        return self.is_shared if state is None else state not in TERMINAL
+
+    def is_in_question(self, after: int) -> bool:
         """Return whether only the fleet's store can say whether a task exists."""
-        return self._dependencies.is_in_question(task_id)
+        is_known = after in self.expected or after in self._told
+        return self.is_shared and not is_known and self._registry.get(after) is None
 
     def is_expecting(self, task: Task) -> bool:
         """Return whether a waiting task runs after one that is not ours."""
         waiter = self._waiters.get(task.id)
-        is_met = waiter is None or waiter.is_met
-        return not is_met and task.terms.after in self._dependencies.expected
+        return waiter is not None and not waiter.is_met and task.terms.after in self.expected
+
+    def _check(self, after: int) -> None:
+        """Raise Rejection if a task could never run after this one."""
+        state = self._stands(after)
+        if state is None and after not in self.expected:
+            raise Rejection(R.UNKNOWN_DEPENDENCY, f"run after {after}: no such task")
+        if state is not None and self._has_failed(after):
+            words = f"run after {after}: that task has ended ({state.name.lower()})"
+            raise Rejection(R.DEPENDENCY_FAILED, words)
+
+    def _check_change(self, task: Task, after: int) -> None:
+        """Raise Rejection if a waiting task cannot be changed to run after this one.
+
+        It would wait for itself, directly or through others, or nobody knows whether it would.
+        """
+        if self.is_shared and self._registry.get(after) is None:
+            words = f"run after {after}: no rover of this gateway has that task:"
+            words += " cancel this one, and submit it again to run after that"
+            raise Rejection(R.UNKNOWN_DEPENDENCY, words)
+        self._check(after)
+        seen = after
+        while seen:
+            if seen == task.id:
+                raise Rejection(R.CYCLE, f"run after {after}: the tasks would wait for each other")
+            if seen in self.expected:
+                words = f"run after {after}: that one waits for task {seen} of another gateway"
+                raise Rejection(R.CYCLE, f"{words}; perhaps the tasks would wait for each other")
+            ahead = self._registry.get(seen)
+            seen = 0 if ahead is None or ahead.state not in WAITING else ahead.terms.after
+
+    def _depend(self, task: Task) -> None:
+        """Note what a waiting task runs after, unless that has completed.
+
+        Only that lets a task become ready. By now the store may have deleted the one before it.
+        """
+        after, state = task.terms.after, self._stands(task.terms.after)
+        was_met = self.is_shared and self._registry.get(after) is None and task.state is S.QUEUED
+        is_met = bool(after) and (state is S.COMPLETED or was_met)
+        self._waiters[task.id].is_met = is_met
+        if after and not is_met:
+            self._dependents.setdefault(after, {})[task.id] = None
+            if self.is_shared and self._registry.get(after) is None:
+                self.expected.add(after)
+
+    def _part(self, task_id: TaskId, after: int) -> None:
+        """Remove a dependency; the task that was waited for may lose an inherited rank."""
+        dependents = self._dependents.get(after, {})
+        if task_id in dependents:
+            del dependents[task_id]
+            if not dependents:
+                del self._dependents[after]
+                self.expected.discard(after)
+            self._lift(TaskId(after))
+
+    def _part_all(self, task_id: int, *, completed: bool, now: float) -> None:
+        """Settle the dependents of a task that is over, or fail them and their dependents."""
+        over = [task_id]
+        while over:
+            self.expected.discard(over[-1])
+            for dependent in self._dependents.pop(over.pop(), ()):
+                task = self._registry[dependent]
+                if completed:
+                    self._waiters[dependent].is_met = True
+                    self._settle(task, now=now)
+                else:
+                    self._end(task, S.FAILED, R.DEPENDENCY_FAILED, now=now)
+                    over.append(dependent)
 
     @contextmanager
     def told(self, states: Mapping[int, TaskState | None], *, now: float) -> Iterator[None]:
@@ -433,63 +484,52 @@ class PendingTasks:
 
         None: there is no such task. If ours run after it, it was withdrawn: they fail.
         """
-        for task_id in sorted(self._dependencies.expected & states.keys()):
+        for task_id in sorted(self.expected & states.keys()):
             state = states[task_id]
             if state is None or state in TERMINAL:
-                self._part_all(TaskId(task_id), completed=state is S.COMPLETED, now=now)
-        self._dependencies.told = states
+                self._part_all(task_id, completed=state is S.COMPLETED, now=now)
+        self._told = states
         yield
-        self._dependencies.told = {}
+        self._told = {}
 
     def _look_again(self, *, now: float) -> None:
-        for task_id in self._dependencies.look_again():  # it ended while another gateway had it
-            self.ended(task_id, now=now)
-
-    def _fail(self, task_id: TaskId, *, now: float) -> None:
-        self.leave(self._registry[task_id])
-        self._registry.change(task_id, S.FAILED, reason=R.DEPENDENCY_FAILED, actor=SERVER, now=now)
-
-    def _waiting(self, task_id: TaskId) -> Task | None:
-        return self._registry[task_id] if task_id in self._waiters else None
-
-    def _part(self, task_id: TaskId, after: int) -> None:
-        """Remove a dependency; the task that was waited for may lose an inherited rank."""
-        if self._dependencies.forget(task_id, after):
-            self._lift(TaskId(after))
+        """Take that the registry has other tasks now: some ended while another gateway had them."""
+        before = self.expected
+        if self.is_shared:
+            lacks = (each for each in self._dependents if self._registry.get(each) is None)
+            self.expected = set(lacks)
+        for task_id in sorted(before):
+            task = self._registry.get(task_id)
+            if task is not None and task.state in TERMINAL:
+                self.ended(task.id, now=now)
 
     # order
 
-    def _rerank(self, task: Task) -> None:
+    def _own_rank(self, task: Task, came_at: float) -> Rank:
+        """Return a task's own rank, if it has competed with others since ``came_at``."""
+        place = task.terms.place or QueuePlace(task.terms.priority, came_at, task.id)
+        aging = self._settings.queueing.aging
+        return rank_of(place.priority, came_at=place.at, task_id=place.task_id, aging=aging)
+
+    def _rerank(self, task: Task, *, came_at: float) -> None:
         waiter = self._waiters[task.id]
-        waiter.own = _own_rank(self._settings, task, waiter.came_at)
+        waiter.came_at, waiter.own = came_at, self._own_rank(task, came_at)
         self._lift(task.id)
 
     def _most_urgent(self, task_id: TaskId, own: Rank) -> Rank:
         """Return a task's own rank, or that of its most urgent dependent if that is more urgent."""
-        dependents = map(self._waiters.get, self._dependencies.of(task_id))
+        dependents = map(self._waiters.get, self._dependents.get(task_id, ()))
         return min([own, *(waiter.rank for waiter in dependents if waiter is not None)])
 
     def _lift(self, task_id: TaskId) -> None:
         """Update the rank of a task and, through it, of the tasks that it waits for."""
         seen = task_id
-        while True:
-            waiter = self._waiters.get(seen)
-            if waiter is None:
-                return
+        while waiter := self._waiters.get(seen):
             rank = self._most_urgent(seen, waiter.own)
             if rank == waiter.rank and seen != task_id:
                 return
             waiter.rank = rank
             task = self._registry[seen]
-            if seen in self.queue(task.vehicle):
+            if seen in self._queues[task.vehicle]:
                 self._line_up(task)
-            if not task.terms.after:
-                return
             seen = TaskId(task.terms.after)
-
-
-def _own_rank(settings: Settings, task: Task, came_at: float) -> Rank:
-    """Return a task's own rank, if it has competed with others since ``came_at``."""
-    place = task.terms.place or QueuePlace(task.terms.priority, came_at, task.id)
-    aging = settings.queueing.aging
-    return rank_of(place.priority, came_at=place.at, task_id=place.task_id, aging=aging)

@@ -1,4 +1,4 @@
-"""The queue of one vehicle, and the order of waiting tasks, which only this module decides.
+"""The queue of one vehicle, and the order of tasks, which only this module decides.
 
 A higher priority runs first; within a priority, first come, first served. Every ``aging`` seconds
 of waiting count as one priority. All tasks age at the same rate, so that a static rank suffices: it
@@ -10,7 +10,9 @@ from bisect import bisect_left, insort
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, QueuePlace, TaskId
+from mav_tasks.settings import Queueing
+from mav_tasks.tasks.lifecycle import TaskState
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, QueuePlace, Task, TaskId
 
 
 class Rank(NamedTuple):
@@ -29,6 +31,20 @@ def rank_of(priority: int, *, came_at: float, task_id: float, aging: float) -> R
         return Rank(False, 0.0, came_at, task_id, priority)
     urgency = came_at - priority * aging if aging > 0 else -float(priority)
     return Rank(True, urgency, came_at, task_id, priority)
+
+
+def outranks(waiting: Task, running: Task, *, queueing: Queueing) -> bool:
+    """Return whether a waiting task may interrupt a running one.
+
+    Only the submitted or modified terms count, not aging and not an inherited rank.
+    """
+    is_running = running.state in (TaskState.STARTING, TaskState.EXECUTING)
+    if not is_running or not running.terms.is_preemptible:
+        return False
+    if waiting.terms.is_preemptive:
+        return not running.terms.is_preemptive or waiting.priority > running.priority
+    gap = queueing.preemption_gap
+    return gap > 0 and waiting.priority - running.priority >= gap
 
 
 class Entry(NamedTuple):
@@ -67,37 +83,42 @@ class TaskQueue:
     def __contains__(self, task_id: TaskId) -> bool:
         return task_id in self._entries
 
+    def _places(self, entry: Entry) -> list[tuple[list[Any], tuple[Any, ...]]]:
+        """Return the lists that a task belongs to, each with its item there."""
+        task_id, rank, priority, is_preemptive = entry
+        by_priority = (-priority, rank, task_id)
+        places: list[tuple[list[Any], tuple[Any, ...]]] = [
+            (self._order, (rank, task_id)),
+            (self._by_priority, by_priority),
+        ]
+        if is_preemptive:
+            places.append((self._preemptive, by_priority))
+        return places
+
     def put(self, entry: Entry) -> None:
         """Insert a task, or move it to its new place."""
-        task_id, rank, priority, is_preemptive = entry
-        if task_id in self._entries:
-            self.discard(task_id)
-        self._entries[task_id] = entry
-        _insert(self._order, (rank, task_id))
-        by_priority = (-priority, rank, task_id)
-        _insert(self._by_priority, by_priority)
-        if is_preemptive:
-            _insert(self._preemptive, by_priority)
+        self.discard(entry.task_id)
+        self._entries[entry.task_id] = entry
+        for ordered, item in self._places(entry):
+            if ordered and item < ordered[-1]:
+                insort(ordered, item)
+            else:  # nearly always
+                ordered.append(item)
 
     def put_all(self, entries: Iterable[Entry]) -> None:
         """Insert many tasks; none of them may be in the queue yet."""
-        for task_id, rank, priority, is_preemptive in (several := list(entries)):
-            self._order.append((rank, task_id))
-            self._by_priority.append((-priority, rank, task_id))
-            if is_preemptive:
-                self._preemptive.append((-priority, rank, task_id))
-        self._entries.update((entry.task_id, entry) for entry in several)
+        for entry in entries:
+            self._entries[entry.task_id] = entry
+            for ordered, item in self._places(entry):
+                ordered.append(item)
         for each in (self._order, self._by_priority, self._preemptive):
             each.sort()
 
     def discard(self, task_id: TaskId) -> None:
         """Remove a task if it is in the queue."""
         if entry := self._entries.pop(task_id, None):
-            by_priority = (-entry.priority, entry.rank, task_id)
-            _remove(self._order, (entry.rank, task_id))
-            _remove(self._by_priority, by_priority)
-            if entry.is_preemptive:
-                _remove(self._preemptive, by_priority)
+            for ordered, item in self._places(entry):
+                del ordered[bisect_left(ordered, item)]
 
     def first(self) -> TaskId | None:
         """Return the task that runs next, or None."""
@@ -138,16 +159,3 @@ class TaskQueue:
     def in_order(self) -> list[TaskId]:
         """Return all tasks, next one first."""
         return self.page(0, len(self))
-
-
-def _insert(ordered: list[Any], item: tuple[Any, ...]) -> None:
-    """Insert an item into a sorted list: nearly always at its end, which one comparison shows."""
-    if ordered and item < ordered[-1]:
-        insort(ordered, item)
-    else:
-        ordered.append(item)
-
-
-def _remove(ordered: list[Any], item: tuple[Any, ...]) -> None:
-    """Remove an item that a sorted list contains."""
-    del ordered[bisect_left(ordered, item)]

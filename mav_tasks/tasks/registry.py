@@ -4,13 +4,15 @@ All changes of tasks go through the registry, so that the journal and the tasks 
 Events are numbered from 1. The store reports the number up to which they are durable.
 """
 
-from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Sequence
+from collections import defaultdict, deque
+from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import cast
 
+from mav_tasks.errors import Rejection
 from mav_tasks.tasks.events import (
+    SERVER,
     Event,
     StepReached,
     TaskAdvanced,
@@ -20,6 +22,7 @@ from mav_tasks.tasks.events import (
     TaskProgressed,
     TaskSubmitted,
     TaskWithdrawn,
+    VehicleNoted,
 )
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import (
@@ -30,12 +33,63 @@ from mav_tasks.tasks.lifecycle import (
     check_transition,
 )
 from mav_tasks.tasks.repetition import why_series_ends
-from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms
-from mav_tasks.tasks.task_ids import TaskIds
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, following
 from mav_tasks.tasks.timing import Timing
 
 STATES = len(TaskState)
 KEPT_FINISHED = 10_000  # tasks; beyond this the registry forgets the oldest finished ones
+
+
+class TaskIds:
+    """Ids begin at 1 again after MAX_TASK_ID; the earlier tasks with these ids are long over."""
+
+    def __init__(self, next_id: int = 1) -> None:
+        self._next = next_id
+        self._left = 0  # of the present range
+        self._ranges: deque[tuple[int, int]] = deque()
+        self._is_shared = False
+
+    def __repr__(self) -> str:
+        return f"TaskIds({self._next}, {self._ranges if self._is_shared else 'all'})"
+
+    def count_from(self, next_id: int) -> None:
+        """Continue with this id."""
+        self._next = next_id
+
+    def share(self) -> None:
+        """Use granted ids only: other gateways give ids, too."""
+        self._is_shared = True
+
+    def grant(self, first: int, count: int) -> None:
+        """Add ``count`` ids from ``first`` on."""
+        self._ranges.append((first, count))
+
+    def take(self, used: Container[int]) -> TaskId:
+        """Return the next id that is not in use; raise Rejection if none is granted."""
+        if not self._is_shared:
+            self._next = self._free(self._next, used)
+            return self._step()
+        while True:
+            if not self._left:
+                if not self._ranges:
+                    words = "the database has not granted a task id yet: not accepted"
+                    raise Rejection(TaskReason.STORE_UNAVAILABLE, words)
+                self._next, self._left = self._ranges.popleft()
+            self._left -= 1
+            task_id = self._step()
+            if task_id not in used:
+                return task_id
+
+    def _step(self) -> TaskId:
+        task_id = TaskId(self._next)
+        self._next = following(task_id)
+        return task_id
+
+    @staticmethod
+    def _free(task_id: int, used: Container[int]) -> int:
+        while task_id in used:
+            task_id = following(task_id)
+        return task_id
 
 
 class TaskRegistry:
@@ -78,24 +132,21 @@ class TaskRegistry:
 
     def counts(self, vehicle: int) -> list[int]:
         """Return how many tasks of a vehicle are in each state; the index is the TaskState."""
-        return list(self._counts.get(vehicle, [0] * STATES))
+        return list(self._counts[vehicle])
 
-    def restore(self, tasks: Sequence[Task], *, next_id: int = 0) -> None:
-        """Load the tasks of an earlier run, all of them durable; ``next_id`` 0: as before."""
-        if next_id:
-            self.ids.count_from(next_id)
+    def count_waiting(self, vehicle: int) -> int:
+        """Return how many tasks of a vehicle have not started."""
+        return sum(self._counts[vehicle][: TaskState.STARTING])
+
+    def restore(self, tasks: Sequence[Task]) -> None:
+        """Load the tasks of an earlier run, all of them durable."""
         self._tasks.update((task.id, task) for task in tasks)
-        self._last_event.update((task.id, 0) for task in tasks)
-        counts = Counter((task.vehicle, task.state) for task in tasks)
-        for (vehicle, state), count in counts.items():
-            self._counts[vehicle][state] += count
         over = [task for task in tasks if task.state in TERMINAL]
-        over.sort(
-            key=lambda task: task.submitted_at if task.changed_at is None else task.changed_at
-        )
+        over.sort(key=lambda task: task.ended_at)
         self._finished.extend(task.id for task in over)
         newest: dict[int, Task] = {}  # by series
         for task in tasks:
+            self._counts[task.vehicle][task.state] += 1
             if task.state not in TERMINAL:
                 self._note_live(task)
             if task.terms.series:
@@ -135,9 +186,9 @@ class TaskRegistry:
         task_id: TaskId,
         new: TaskState,
         *,
-        reason: TaskReason,
-        actor: str,
         now: float,
+        reason: TaskReason = TaskReason.NONE,
+        actor: str = SERVER,
         progress: Progress | None = None,
         timing: Timing | None = None,
     ) -> Task:
@@ -163,16 +214,16 @@ class TaskRegistry:
         counts[new] += 1
         self.record(
             TaskChanged(
-                task_id=task_id,
-                vehicle=task.vehicle,
-                version=task.version,
-                old=old.state,
-                new=new,
-                reason=reason,
-                actor=actor,
-                at=now,
-                progress=task.progress,
-                timing=task.timing,
+                task_id,
+                task.vehicle,
+                task.version,
+                old.state,
+                new,
+                reason,
+                actor,
+                now,
+                task.progress,
+                task.timing,
             )
         )
         self._last_event[task_id] = self.recorded
@@ -183,7 +234,7 @@ class TaskRegistry:
             self._finish(task_id)
         return task
 
-    def modify(self, task_id: TaskId, terms: Terms, *, actor: str, now: float) -> Task:
+    def modify(self, task_id: TaskId, terms: Terms, *, actor: str = SERVER, now: float) -> Task:
         """Change the terms of a task that is not over, or no longer repeats."""
         old = self._tasks[task_id]
         task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)
@@ -235,7 +286,7 @@ class TaskRegistry:
         task = self._tasks.pop(task_id)
         self._counts[task.vehicle][task.state] -= 1
         self._forget_live(task)
-        del self._last_event[task_id]
+        self._last_event.pop(task_id, None)
         self.record(TaskWithdrawn(task_id, task.vehicle, now))
 
     def latest(self, submitter: Submitter, command: int, *, vehicle: int) -> Task | None:
@@ -258,14 +309,11 @@ class TaskRegistry:
         runs = (self._tasks[each] for each in self.unplanned if each in self._tasks)
         return next((task.id for task in runs if task.terms.series == series), None)
 
-    def unplanned_of(self, vehicle: int) -> list[Task]:
-        """Return the runs of a vehicle that are over, and which another one is to follow."""
-        over = (self._tasks[each] for each in self.unplanned if each in self._tasks)
-        return [task for task in over if task.vehicle == vehicle and not why_series_ends(task)]
-
     def runs_of(self, vehicle: int) -> list[Task]:
-        """Return the runs of a vehicle's series that are not over, one of each series."""
-        runs = (self._tasks[task_id] for task_id in self.runs.values())
+        """Return a run of each of a vehicle's series: it is not over, or another is to follow."""
+        over = [self._tasks[each] for each in self.unplanned if each in self._tasks]
+        runs = [self._tasks[task_id] for task_id in self.runs.values()]
+        runs += [task for task in over if not why_series_ends(task)]
         return [task for task in runs if task.vehicle == vehicle]
 
     def is_awaited_at(self, link: str, endpoint: str) -> bool:
@@ -279,9 +327,13 @@ class TaskRegistry:
             self._last_of[vehicle] = self.recorded
         self._events.append(event)
 
+    def note(self, vehicle: int, words: str, *, now: float) -> None:
+        """Record something about a vehicle that its operator should read."""
+        self.record(VehicleNoted(vehicle, words, now))
+
     def is_durable(self, task_id: TaskId) -> bool:
         """Return whether the task's last submission, state change or modification is durable."""
-        return self._last_event[task_id] <= self.durable
+        return self._last_event.get(task_id, 0) <= self.durable
 
     def is_all_durable(self, vehicle: int) -> bool:
         """Return whether all events of a vehicle are durable."""
@@ -296,7 +348,7 @@ class TaskRegistry:
         gone = {task.id: task for task in self._tasks.values() if task.vehicle == vehicle}
         for task_id, task in gone.items():
             del self._tasks[task_id]
-            del self._last_event[task_id]
+            self._last_event.pop(task_id, None)
             self.unplanned.pop(task_id, None)  # the next gateway goes on with its series
             if task.state not in TERMINAL:
                 self._forget_live(task)
@@ -316,7 +368,7 @@ class TaskRegistry:
             oldest = self._finished.popleft()
             task = self._tasks.pop(oldest)
             self._counts[task.vehicle][task.state] -= 1
-            del self._last_event[oldest]
+            self._last_event.pop(oldest, None)
 
     def _note_live(self, task: Task) -> None:
         self._live.setdefault((task.submitter, task.command, task.vehicle), {})[task.id] = None

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from mav_tasks.tasks.events import SignatureTime
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
 #: stored plans by system id and kind: (id, source) as in PlanStored

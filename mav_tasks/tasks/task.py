@@ -275,6 +275,11 @@ class Task:
         return self.terms.priority
 
     @property
+    def ended_at(self) -> float:
+        """When a task that is over ended, monotonic seconds."""
+        return self.submitted_at if self.changed_at is None else self.changed_at
+
+    @property
     def is_made(self) -> bool:
         """Whether the server made it, as a later run of a series."""
         return self.terms.series not in (0, self.id)

@@ -8,14 +8,19 @@ from dataclasses import replace
 from math import inf
 
 from mav_tasks.errors import Rejection
-from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.driving.mission_sequencer import goal_of, present_goal, skipped_to
-from mav_tasks.tasks.driving.watches import JumpWatch
+from mav_tasks.tasks.driving.legs import leg_of
+from mav_tasks.tasks.driving.mission_sequencer import (
+    goal_of,
+    has_local_place,
+    present_goal,
+    skipped_to,
+)
+from mav_tasks.tasks.driving.stage import is_off_line
 from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
-from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.halts import NOBODY, LastHalt
+from mav_tasks.tasks.goal import MoveTurned, Plan, Rotate
+from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, LastHalt
 from mav_tasks.tasks.lifecycle import (
     CONTINUE_FIRST,
     TAKEN,
@@ -24,65 +29,54 @@ from mav_tasks.tasks.lifecycle import (
     TaskState,
     words_of,
 )
-from mav_tasks.tasks.lineup import Lineup
-from mav_tasks.tasks.pending_tasks import PendingTasks
-from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.releases import Releases
-from mav_tasks.tasks.task import Draft, Progress, Task, TaskId, Terms
-from mav_tasks.tasks.turns import Turns
+from mav_tasks.tasks.lineup import Lineup, Released
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Draft, Progress, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
 
 R, S = TaskReason, TaskState
+
+#: the vehicle, or the server, has restarted in the middle of the task
+AFTER_RESTART = frozenset({R.FRAME_RESET, R.OUTCOME_UNKNOWN})
+#: what a release waits for then
+OF_RESTART = frozenset({R.VEHICLE_SILENT, R.NO_POSITION})
 
 
 class VehicleTasks(Lineup):
     """All tasks of the vehicle with this system id."""
 
-    def __init__(
-        self, vehicle: int, registry: TaskRegistry, room: PendingTasks, settings: Settings
-    ) -> None:
-        super().__init__(vehicle, registry, room, settings)
-        #: selects the next task
-        self.turns = Turns(self)
-        #: releases held tasks
-        self.releases = Releases(self)
-        self._jumps = JumpWatch()
-        #: the vehicle at the last step
-        self.seen: VehicleView | None = None
-
     # requests
-
-    def apply(self, settings: Settings) -> None:
-        self.settings = settings
-        self.terms.apply(settings)
 
     def restore(
         self,
         tasks: Iterable[Task],
+        restored: Restored,
         *,
         paused: TaskReason,
-        speed: float | None,
-        uid: str,
-        now: float,
-        halt_epoch: int = 1,
-        halt: LastHalt = NOBODY,
-        may_be_armed: bool = True,
         resuming: Container[TaskId] = (),
+        now: float,
     ) -> None:
         """Load the active and suspended tasks of an earlier run; those ``resuming`` go on alone."""
-        self.halts.restore(halt_epoch, halt, now=now)
-        self.halt(R.RESTARTED, actor=SERVER, now=now)
-        self.paused = paused
-        self.terms.restore(speed=speed, uid=uid, may_be_armed=may_be_armed)
+        vehicle = self.vehicle
+        last = LastHalt(*restored.halted.get(vehicle, NOBODY))
+        by_somebody = last if last.reason in BY_SOMEBODY else NOBODY
+        self.halts.restore(restored.halt_epochs.get(vehicle, 1), by_somebody, now=now)
+        self.halt(R.RESTARTED, now=now)
+        self.paused, self._speed = paused, restored.speeds.get(vehicle)
+        self.uid = restored.uids.get(vehicle, "")
+        self.may_be_armed = vehicle not in restored.disarmed
+        self._apply_driving()
         for task in tasks:
             self.of_earlier_run.add(task.id)
-            if self.active is None and task.reason is not R.PREEMPTED:
-                if task.id in resuming:
-                    self.executor.take_over(task, now=now)
-                else:
-                    self.executor.adopt(task)
-            else:
+            if self.active is not None or task.reason is R.PREEMPTED:
                 self.suspended_ids[task.id] = None
+            elif task.id in resuming:
+                self.executor.take_over(task, now=now)
+            else:
+                self.executor.adopt(task)
+        if paused is R.STOPPED and last.reason is R.STOPPED:
+            # the earlier run has done so, but its last events may not have been stored
+            self._repeat_nothing(R.STOP, now=now, since=last.at)
 
     def belong_to_another(self, *, now: float) -> None:
         """Hold and pause these tasks: another vehicle answers at the address of theirs."""
@@ -93,22 +87,21 @@ class VehicleTasks(Lineup):
 
     def unidentified(self, *, now: float) -> None:
         """Pause these tasks: their vehicle has a unique id, and this one reports none."""
-        self.terms.forget_which()
+        self.uid = ""
         if not self.is_empty:
             self._wait_for_somebody(now=now)
 
     def _wait_for_somebody(self, *, now: float) -> None:
         """Start nothing before somebody has looked which vehicle this is."""
-        self.halt(R.RESTARTED, actor=SERVER, now=now)
-        if self.is_driving or self.room.count(self.vehicle):
-            self.executor.pause(R.OPERATOR, actor=SERVER, now=now)
-            self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
+        self.halt(R.RESTARTED, now=now)
+        if not self.is_empty:
+            self.executor.pause(R.OPERATOR, now=now)
+            self.pause_queue(R.RESTARTED, now=now)
 
-    def _end_cancelling(self, *, now: float) -> None:
-        active = self.active
-        if active is not None and active.state is S.CANCELLING:
-            self.executor.let_go(actor=SERVER, now=now)
-            self._ended(active.id, now=now)
+    def _end_cancelling(self, *, actor: str = SERVER, now: float) -> None:
+        """End a CANCELLING task without waiting for standstill."""
+        if (ended := self.executor.let_go(actor=actor, now=now)) is not None:
+            self._ended(ended, now=now)
 
     def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> TaskId:
         """Add a task that runs at once; all others wait until the queue is resumed.
@@ -177,18 +170,16 @@ class VehicleTasks(Lineup):
                 self.registry.change(task.id, S.CANCELLING, reason=reason, actor=actor, now=now)
             self.registry.change(task.id, state, reason=reason, actor=actor, now=now)
             self.room.ended(task.id, now=now)
-        elif kill:
-            self.stopping_after_kill |= not self._is_of_another_driver(task)
-            self.executor.kill(reason, actor=actor, now=now)
-            self._ended(task.id, now=now)
         else:
-            self.executor.cancel(reason, actor=actor, now=now)
+            if kill:
+                others = task.reason in TAKEN  # somebody else has the vehicle
+                others |= self.paused in TAKEN and task.reason is R.FRAME_RESET
+                self.stopping_after_kill |= not others
+                self.executor.kill(reason, actor=actor, now=now)
+            else:
+                self.executor.cancel(reason, actor=actor, now=now)
             if self.active is None:
                 self._ended(task.id, now=now)
-
-    def _is_of_another_driver(self, task: Task) -> bool:
-        """Return whether an active task was interrupted because somebody else has the vehicle."""
-        return task.reason in TAKEN or (self.paused in TAKEN and task.reason is R.FRAME_RESET)
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change a task's terms. Raise Rejection if its dependency cannot complete."""
@@ -203,10 +194,10 @@ class VehicleTasks(Lineup):
         """Cancel the waiting tasks; with ``begun_too`` the active and suspended ones, too."""
         self.room.clear(self.vehicle, R.CLEARED, actor=actor, now=now)
         self._repeat_nothing(R.CLEARED, actor=actor, now=now)
-        if not begun_too:
-            return
-        for task in [*self.suspended, *([] if self.active is None else [self.active])]:
-            self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
+        if begun_too:
+            active = [] if self.active is None else [self.active]
+            for task in self.suspended + active:
+                self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
 
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
         """Continue, or start, an unfinished plan at another of its steps."""
@@ -222,11 +213,6 @@ class VehicleTasks(Lineup):
         if seen.motion is not None and active is not None and active.state is S.PAUSED:
             self.executor.drive.rest(active, seen.motion, now=now)
 
-    def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
-        """Set the speed of the active and later tasks. Return the active task's id, or None."""
-        self.terms.set_speed(speed, actor=actor, now=now)
-        return None if self.active is None else self.active.id
-
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
         """Pause the active task and the queue. Return the task's id, or None. Never undo a STOP.
 
@@ -235,15 +221,11 @@ class VehicleTasks(Lineup):
         self.halt(reason, actor=actor, now=now)
         self.executor.pause(reason, actor=actor, now=now)
         self.pause_queue(reason, actor=actor, now=now)
-        active = self.active
         if reason in TAKEN:
             last = self._jumps.last
             self.displaced.taken_over(None if last is None else last.pose)
-            if active is not None and active.state is S.CANCELLING:
-                self.executor.let_go(actor=actor, now=now)
-                self._ended(active.id, now=now)
-                active = None
-        return None if active is None else active.id
+            self._end_cancelling(actor=actor, now=now)
+        return self.executor.task_id
 
     def proceed(
         self, seen: VehicleView, *, actor: str, now: float, allows: bool = False
@@ -254,35 +236,28 @@ class VehicleTasks(Lineup):
         held task keeps blocking the queue. Raise Rejection also if only a held task blocks it and
         the request does not allow arming again (``allows``): then there is nothing to resume.
         """
-        active = self.active
         held = self.held
-        resumes = active is not None and active.state is S.PAUSED and held is None
+        active = self.active if held is None else None
+        resumed = active if active is not None and active.state is S.PAUSED else None
         if held is not None and not self.paused and not allows:
             words = (
                 f"task {held.id} is held ({words_of(held.reason)}): release it"
                 " (again, remainder or skip)"
             )
             raise Rejection(R.WRONG_STATE, words)
-        if resumes:
-            assert active is not None
-            self.check_start(seen, goal_of(active), now=now)
+        if resumed is not None:
+            self.check_start(seen, goal_of(resumed), now=now)
         if self.paused or self.halts.by_somebody is not NOBODY:
             self.paused = R.NONE
             self.halts.lets_go()
             self.registry.record(QueueContinued(self.vehicle, actor, now))
             self.displaced.given_back(seen, self.suspended_ids)
-        if resumes:
-            assert active is not None
-            self._resume(active, seen, actor=actor, now=now)
-        active = self.active
-        return None if active is None or held is not None else active.id
-
-    def _resume(self, task: Task, seen: VehicleView, *, actor: str, now: float) -> None:
-        if self.is_of_another_frame(task, seen):
+        if resumed is not None and self.is_of_another_frame(resumed, seen):
             self.executor.hold(R.FRAME_RESET, now=now)
-        else:
+        elif resumed is not None:
             self.executor.resume(seen, actor=actor, now=now)
-            self.begun_at = now
+            self._begun_at = now
+        return None if active is None else active.id
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
         """Hold the active task until a client decides.
@@ -290,12 +265,12 @@ class VehicleTasks(Lineup):
         FRAME_RESET also holds the paused tasks that had started a leg: their lines are lost, too.
         """
         if self.is_driving:
-            self.halt(reason, actor=SERVER, now=now)
+            self.halt(reason, now=now)
         self.executor.hold(reason, now=now)
         if reason is R.FRAME_RESET:
             for task in self.suspended:
                 if task.state is S.PAUSED and task.progress.anchor is not None:
-                    self.registry.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
+                    self.registry.change(task.id, S.HELD, reason=reason, now=now)
 
     def restarted(self, *, was_paused: TaskReason, now: float) -> bool:
         """Hold the tasks of a vehicle that has rebooted, and pause the queue until it is resumed.
@@ -310,7 +285,7 @@ class VehicleTasks(Lineup):
             return False
         self.hold(R.FRAME_RESET, now=now)
         if was_driving and not was_paused:
-            self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
+            self.pause_queue(R.RESTARTED, now=now)
         return was_driving
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
@@ -322,7 +297,6 @@ class VehicleTasks(Lineup):
         self.halt(R.STOPPED, actor=actor, now=now)
         killed = self.executor.kill(R.STOP, actor=actor, now=now)
         self._end_clicks(actor=actor, now=now)
-        self.immediate = None
         self.pause_queue(R.STOPPED, actor=actor, now=now)
         if clear:
             self.clear(begun_too=True, actor=actor, now=now)
@@ -341,7 +315,6 @@ class VehicleTasks(Lineup):
             self.executor.kill(R.STOP, actor=actor, now=now)
             self._ended(active.id, now=now)
         self._end_clicks(actor=actor, now=now)
-        self.immediate = None
         if self.has_others:
             self.pause_queue(R.OPERATOR, actor=actor, now=now)
 
@@ -350,16 +323,10 @@ class VehicleTasks(Lineup):
         for task in self.unfinished:
             if task.is_click:
                 self._end(task, S.KILLED, R.STOP, actor=actor, now=now)
-
-    def was_stopped(self, *, at: float, now: float) -> None:
-        """End each series that was there at a STOP of an earlier run.
-
-        That run has done so, but its last events may not have been stored.
-        """
-        self._repeat_nothing(R.STOP, actor=SERVER, now=now, since=at)
+        self.immediate = None
 
     def _repeat_nothing(
-        self, reason: TaskReason, *, actor: str, now: float, since: float = inf
+        self, reason: TaskReason, *, actor: str = SERVER, now: float, since: float = inf
     ) -> None:
         """End each series: its waiting run ends, one that has started does not repeat.
 
@@ -372,9 +339,90 @@ class VehicleTasks(Lineup):
                 self.room.end(task, S.KILLED, reason, actor=actor, now=now)
             else:
                 self.registry.repeat_no_more(task.id, actor=actor, now=now)
-        for task in self.registry.unplanned_of(self.vehicle):  # between two runs
-            if task.submitted_at <= since:
-                self.registry.repeat_no_more(task.id, actor=actor, now=now)
+
+    # releases of held tasks
+
+    def release(
+        self,
+        task: Task,
+        *,
+        again: bool,
+        may_continue: bool,
+        seen: VehicleView,
+        actor: str,
+        now: float,
+    ) -> None:
+        """Resume a held task from here: all of it (``again``), or its remainder.
+
+        Raise Rejection, and change nothing, if the task could not take the vehicle now. If the
+        queue is paused, or the vehicle or the server has restarted and the vehicle is not ready,
+        the task waits for that, for ``ready_timeout`` at most, or until something halts it. It does
+        not wait for a queue that is paused for a restart if the client ``may_continue`` it.
+        """
+        if self.is_stopped:
+            raise Rejection(R.STOPPED, CONTINUE_FIRST)
+        active = self.active if self.executor.task_id != task.id else None
+        if active is not None and active.state not in (S.HELD, S.PAUSED):
+            words = f"task {active.id} is {active.state.name.lower()}: release task {task.id} later"
+            raise Rejection(R.WRONG_STATE, words)
+        waits_for = self._waits_for(task, seen, may_continue=may_continue, now=now)
+        if not waits_for:
+            self.check_start(seen, goal_of(task), now=now)
+        if not again:
+            _check_remainder(task, seen)
+        if active is not None:
+            self.set_aside(active.id)
+        if self.active is None:
+            self.suspended_ids.pop(task.id, None)
+            self.executor.adopt(task)
+        self.of_earlier_run.discard(task.id)
+        until, term = now + self.settings.watch.ready_timeout, self.halts.term
+        self.last_released = Released(task.id, again, may_continue, actor, until, R.NONE, term)
+        self._look_at_released(seen, now=now)
+
+    def _look_at_released(self, seen: VehicleView, *, now: float) -> None:
+        """Start a released task once nothing blocks it; hold it as before if it cannot start."""
+        release, task = self.released, self.active
+        if release is None:
+            return
+        if task is None or task.id != release.task_id or task.state is not S.HELD:
+            self.last_released = None
+            return
+        waits_for = self._waits_for(task, seen, may_continue=release.may_continue, now=now)
+        why_not = ""
+        if not waits_for:
+            try:
+                self.check_start(seen, goal_of(task), now=now)
+            except Rejection as refusal:
+                why_not = refusal.text
+        elif now >= release.until and waits_for is not R.QUEUE_PAUSED:
+            why_not = f"waited too long ({words_of(waits_for)})"
+        if why_not:
+            self.last_released = None
+            words = f"holds task {task.id} again: {why_not}. Release it again"
+            self.registry.note(self.vehicle, words, now=now)
+        elif not waits_for:
+            self.last_released = None
+            self.executor.release(task, again=release.again, actor=release.actor, now=now)
+            self._begun_at = now
+        elif waits_for is not release.waits_for:
+            self.last_released = release._replace(waits_for=waits_for)
+            self._tell_wait(task.id, waits_for, now=now)
+
+    def _waits_for(
+        self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
+    ) -> TaskReason:
+        """Return what a released task waits for: the queue, or a reboot; NONE if it can start."""
+        if self.paused and not (self.paused is R.RESTARTED and may_continue):
+            return R.QUEUE_PAUSED
+        if task.reason not in AFTER_RESTART:
+            return R.NONE
+        if seen.heard and seen.is_booting:  # it shows another mode for a moment
+            return R.NO_POSITION
+        if seen.is_engaged:  # it is still being put in HOLD
+            return R.NOT_READY
+        blocker = self.blocker(seen, goal_of(task), now=now)
+        return blocker if blocker in OF_RESTART else R.NONE
 
     # time
 
@@ -389,14 +437,14 @@ class VehicleTasks(Lineup):
             if not seen.still:
                 return view.HALT
             self.stopping_after_kill = False
-        self.releases.look(seen, now=now)
+        self._look_at_released(seen, now=now)
         before = self.active
         demand = self.executor.step(seen, now=now)
         if before is not None:
             self._note_step(before, now=now)
-        if self.active is not None and not self.turns.is_interrupted(seen, now=now):
+        if self.active is not None and not self.is_interrupted(seen, now=now):
             return demand
-        self.turns.begin_next(seen, now=now)
+        self.begin_next(seen, now=now)
         if self.active is not None:  # the refusal was for the task before
             if not self.paused:  # the person who halted it has not paused its queue
                 self.halts.by_somebody = NOBODY
@@ -409,7 +457,7 @@ class VehicleTasks(Lineup):
         if active is None:
             self._ended(before.id, now=now)
         elif active.state is not before.state and active.state in (S.PAUSED, S.HELD):
-            self.halt(active.reason, actor=SERVER, now=now)
+            self.halt(active.reason, now=now)
 
     def _ended(self, task_id: TaskId, *, now: float) -> None:
         """Handle the end of a task. Pause the queue after a failure that had moved the vehicle."""
@@ -417,5 +465,23 @@ class VehicleTasks(Lineup):
         if task_id == self.immediate:
             self.immediate = None
         if task.state is S.FAILED and has_moved(task) and self.settings.on_failure == "pause":
-            self.pause_queue(task.reason, actor=SERVER, now=now)
+            self.pause_queue(task.reason, now=now)
         self.room.ended(task_id, now=now)
+
+
+def _check_remainder(task: Task, seen: VehicleView) -> None:
+    """Raise Rejection unless the remainder is known, on its line or by what was counted."""
+    again = "choose again or skip"
+    if task.reason is R.FRAME_RESET and has_local_place(task.goal):
+        words = f"the position reference of task {task.id} is lost: {again}"
+        raise Rejection(R.WRONG_STATE, words)
+    counts_from_here = task.reason in (R.FRAME_RESET, R.OFF_TRACK)
+    if not counts_from_here and seen.motion and is_off_line(task, seen.motion.pose):
+        raise Rejection(R.OFF_TRACK, f"the rover is off the path of task {task.id}: {again}")
+    progress, goal = task.progress, goal_of(task)
+    if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
+        return
+    leg = leg_of(goal, progress) if isinstance(goal, Rotate | MoveTurned) else None
+    is_turned = isinstance(leg, Rotate) and abs(leg.angle) > 3.0
+    if is_turned or not same_frame(progress.frame, seen.frame):
+        raise Rejection(R.WRONG_STATE, f"the progress of task {task.id} is unknown: {again}")

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from mav_tasks.settings import DEFAULT_TURNING_RADIUS, Turning
+from mav_tasks.settings import DEFAULT_TURNING_RADIUS, Turning, Watch
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
-from mav_tasks.tasks.goal import GlobalPlace
+from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, SingleGoal
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Frame
 
@@ -94,3 +95,37 @@ HOLD = Demand(DemandKind.HOLD)
 HAND_BACK = Demand(DemandKind.HAND_BACK)
 STOP = Demand(DemandKind.STOP)
 HALT = Demand(DemandKind.HALT)
+
+
+def start_blocker(
+    view: VehicleView, *, watch: Watch, now: float, goal: SingleGoal | None = None
+) -> TaskReason:
+    """Return why no task (or none with this goal) can take control of the vehicle now, or NONE.
+
+    The server takes over only from HOLD, from a mode that it set, or from MANUAL while disarmed.
+    """
+    if not view.is_ours:
+        return TaskReason.LEASE_LOST
+    if not view.heard or view.is_unknown:
+        return TaskReason.VEHICLE_SILENT
+    if view.other_controller:
+        return TaskReason.OTHER_CONTROLLER
+    if view.is_booting:
+        return TaskReason.NOT_READY
+    if view.mode is ModeKind.OTHER or (view.mode is ModeKind.MANUAL and view.armed):
+        return TaskReason.WRONG_MODE
+    is_old = view.motion is None or now - view.motion.at > watch.motion_fresh
+    if is_old or view.is_fence_unknown:
+        return TaskReason.NO_POSITION
+    if isinstance(goal, GoTo) and place_of(goal, view) is None:
+        return TaskReason.NO_POSITION
+    if not view.armed and not view.may_arm:
+        return TaskReason.DISARMED
+    if view.is_outside_own_fence:
+        return TaskReason.OUTSIDE_OWN_FENCE
+    return TaskReason.LOSS_FAILSAFE if view.drives_on else TaskReason.NONE
+
+
+def place_of(goal: GoTo, view: VehicleView) -> LocalPlace | None:
+    """Return a goal's place in the vehicle's local frame, or None while that is unknown."""
+    return local_place(view.home if goal.place is None else goal.place, view.origin)

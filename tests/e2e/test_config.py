@@ -10,7 +10,7 @@ from contextlib import closing
 from pathlib import Path
 
 from mav_tasks.store import open_store
-from mav_tasks.tasks.server_events import ParameterSet
+from mav_tasks.tasks.events import ParameterSet
 from tests.e2e.test_usage import run
 from tests.kit.processes import (
     Process,

@@ -10,8 +10,8 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import ParametersChanged
 from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import ParameterSet
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.server_events import ParameterSet
 from tests.kit.cases import for_each
 from tests.kit.client import FakeClient
 from tests.kit.restarts import UTC, restart

@@ -25,8 +25,8 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
 from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import ParameterSet
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.server_events import ParameterSet
 
 BY_NAME = -1  # param_index of a request
 HASH_CHECK = "_HASH_CHECK"  # by which a client with a cache begins: whatever it asks, it wants all

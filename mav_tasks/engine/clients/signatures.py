@@ -27,7 +27,7 @@ from mav_tasks.mavlink.signing import (
     timestamp_at,
     timestamp_of,
 )
-from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen, SignatureTime
+from mav_tasks.tasks.events import SignatureRefused, SignaturesSeen, SignatureTime
 from mav_tasks.tasks.signing_lead import DECAY, STEP
 
 #: stands for the key of unsigned packets, where they are allowed

@@ -32,7 +32,7 @@ def summary_of(tasks: VehicleTasks) -> str:
 
 def next_words(tasks: VehicleTasks) -> str:
     """Return which task drives next, to end a text; "" if none does."""
-    task_id = None if tasks.held else tasks.executor.task_id or tasks.turns.next_id
+    task_id = None if tasks.held else tasks.executor.task_id or tasks.next_id
     task = None if task_id is None else tasks.registry[task_id]
     if task is None or task.state is TaskState.CANCELLING:
         return ""

@@ -174,7 +174,7 @@ class Assignments:
             battery=vehicle.battery,
             free_in=empty.seconds,
             distance=_way_to(goal, empty.pose, view),
-            speed=tasks.terms.driving.speed,
+            speed=tasks.driving.speed,
             waiting=len(tasks.queue),
         )
 

@@ -27,7 +27,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
+from mav_tasks.tasks.deduplicator import Known, SubmissionDeduplicator
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, words_of
@@ -398,10 +398,9 @@ class Submissions:
         task = self._registry.get(known.task_id)
         # one click in QGroundControl sends a command and an item: not a repeat to be told
         is_other_message = task is not None and task.command != asked.command.command
-        if known.is_news and not is_other_message:
-            what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
+        if known.repeats and not is_other_message:
             state = "" if task is None else f", {task.state.name.lower()}"
-            words = f"repeated {what}, no new task: see task {known.task_id}{state}"
+            words = f"repeated {known.repeats}, no new task: see task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
 
 

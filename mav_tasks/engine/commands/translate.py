@@ -27,10 +27,9 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSeen,
 )
-from mav_tasks.tasks.forecast import Forecast, known_of
+from mav_tasks.tasks.forecast import Forecast, estimate, known_of, position, wait_reason
 from mav_tasks.tasks.goal import Goal, GoTo, Move, Plan, Rotate, describe
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, words_of
-from mav_tasks.tasks.outlook import estimate, position, wait_reason
 from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -159,7 +158,7 @@ def task_status(
         submitter_system=submitter.system_id,
         submitter_component=submitter.component_id,
         submitter_link=link_number,
-        text=_cut(_words(task, reason, tasks.turns.words_of_blocker(task.id)), TEXT),
+        text=_cut(_words(task, reason, tasks.words_of_blocker(task.id)), TEXT),
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
         label=task.terms.label.encode(),
         series=task.terms.series,

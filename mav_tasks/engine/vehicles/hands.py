@@ -104,7 +104,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.RESTORE_ARMING:
             parts.authority.restore_arming()
             parts.armings.forget_halts()
-            tasks.terms.let_arm(may_be_armed=True, now=now)
+            tasks.let_arm(may_be_armed=True, now=now)
         case Effect.OUTDATE_ARMING:
             ours, armed = control.arming_asked_at, parts.monitor.armed
             parts.armings.outdate(ours=ours, armed=armed, now=now)

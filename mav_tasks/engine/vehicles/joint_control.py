@@ -222,7 +222,7 @@ class JointControl:
         seen = self._view(now)
         if restores:
             seen = replace(seen, may_arm=authority.may_arm_again)
-        release = self._parts.tasks.releases.release
+        release = self._parts.tasks.release
         do = partial(
             release, task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
         )

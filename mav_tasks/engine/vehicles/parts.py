@@ -120,7 +120,7 @@ class Parts:
 
         It may also have just restarted.
         """
-        unidentified = bool(self.tasks.terms.uid) and not self.requests.is_identified
+        unidentified = bool(self.tasks.uid) and not self.requests.is_identified
         return unidentified or bool(self.undecided) or now < self.listens_until
 
     def note(self, text: str, *, now: float) -> None:
@@ -134,7 +134,7 @@ class Parts:
     def withdraw_arming(self, *, now: float) -> None:
         """Withdraw the permission to arm, also across a restart of the server."""
         self.authority.withdraw_arming()
-        self.tasks.terms.let_arm(may_be_armed=False, now=now)
+        self.tasks.let_arm(may_be_armed=False, now=now)
 
     def forget_answers(self) -> None:
         """Forget everything that the vehicle said of itself before its restart."""

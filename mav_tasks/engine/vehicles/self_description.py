@@ -71,7 +71,7 @@ class SelfDescription:
         """Process any parameter of the vehicle."""
         before = self._says.turning
         self._says.receive(message)
-        self._parts.tasks.terms.cruises(self._says.cruise_speed)
+        self._parts.tasks.cruises(self._says.cruise_speed)
         self.look(now=now)
         if self._says.turning is Turning.STEERED is not before:
             self._parts.tell("steers like a car", now=now)
@@ -98,7 +98,7 @@ class SelfDescription:
             report = parts.note if chosen is None else parts.tell
             report(words or "uses no profile any more", now=now)
         speed, way = (None, None) if chosen is None else (chosen.speed, chosen.stopping_distance)
-        parts.tasks.terms.brakes(None if speed is None or way is None else (speed, way))
+        parts.tasks.brakes(None if speed is None or way is None else (speed, way))
         new, old = self._persona(), parts.persona
         # the mask goes with the frame
         is_alike = new.setpoint_frame == old.setpoint_frame

@@ -49,7 +49,7 @@ class Takeovers:
         parts = self._parts
         mode, persona = parts.monitor.custom_mode, parts.persona
         is_taken = parts.tasks.paused in TAKEN
-        if is_taken or not parts.tasks.terms.may_be_armed:
+        if is_taken or not parts.tasks.may_be_armed:
             parts.withdraw_arming(now=now)
         # It is in HOLD because set-points were lost, and would follow the next one. If somebody had
         # taken it, our set-points had ended before.
@@ -78,7 +78,7 @@ class Takeovers:
             event = Event.COME_BACK_LED_AWAY
         self._joint.on(event, Word(text=words), now=now)
         is_parked = mode == persona.hold_mode and parts.monitor.armed
-        if is_parked and not parts.tasks.terms.may_be_armed:  # by somebody before this run
+        if is_parked and not parts.tasks.may_be_armed:  # by somebody before this run
             self._taken(Event.PARKED, "", now=now)
 
     def _may_drive_on(self, *, now: float) -> bool:

@@ -164,14 +164,13 @@ class Vehicle:
 
     def shows_another(self, message: m.Message | None, *, now: float) -> bool:
         """Return whether its autopilot sends what another vehicle would; note its unique id."""
-        terms = self.tasks.terms
         if isinstance(message, m.AutopilotVersion):
-            return terms.is_another(uid_of(message), now=now)
+            return self.tasks.is_another(uid_of(message), now=now)
         if not isinstance(message, m.Heartbeat) or kind_of(message) == kind_of(
             self._monitor.latest
         ):
             return False
-        terms.forget_which()
+        self.tasks.uid = ""
         return True
 
     def shut(self) -> bool:
@@ -377,7 +376,7 @@ class Vehicle:
     def _ask_for_rates(self, *, now: float) -> None:
         if self._was_heard:  # a silent vehicle cannot answer: ask it nothing
             self.requests.ask_which(now=now)
-            if self.tasks.terms.uid and self.requests.has_not_said_which(now=now):
+            if self.tasks.uid and self.requests.has_not_said_which(now=now):
                 if not self.tasks.is_empty:  # they are paused, which is a halt
                     self.joint.on(Event.DRIVING_ENDS, Word(), now=now)
                 self.tasks.unidentified(now=now)

@@ -210,7 +210,7 @@ class VehicleLinks:
         is_beat, was_same = isinstance(message, m.Heartbeat), way.is_same
         if was_same and now - way.heard_at > self._settings.watch.heartbeat_lost:
             way.is_same, way.first_at = None, now  # another one may be there now
-        uid = "" if is_heard and not vehicle.requests.is_identified else vehicle.tasks.terms.uid
+        uid = "" if is_heard and not vehicle.requests.is_identified else vehicle.tasks.uid
         way.judge(message, uid, used, is_heard=is_heard, used_at=vehicle.heard_at)
         is_gone = not is_heard or self._is_gone(old)
         is_better = way.is_better_than(used, vehicle.counted_at, now=now)

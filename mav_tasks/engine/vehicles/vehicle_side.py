@@ -114,7 +114,7 @@ class VehicleSide(VehicleLinks):
         self.touched.clear()
         for vehicle in touched:
             system_id = vehicle.system_id
-            if vehicle.tasks.turns.awaits_commit:
+            if vehicle.tasks.awaits_commit:
                 self._awaiting[system_id] = vehicle
             else:
                 self._awaiting.pop(system_id, None)
@@ -384,7 +384,7 @@ class VehicleSide(VehicleLinks):
         if (
             tasks
             and heartbeat.autopilot != NO_AUTOPILOT
-            and not self._strangers.is_alone(beat, (kind_of(heartbeat), tasks.terms.uid))
+            and not self._strangers.is_alone(beat, (kind_of(heartbeat), tasks.uid))
         ):
             self.note_once(number, SHARED, now=now)
             return None

@@ -34,9 +34,8 @@ from mav_tasks.tasks.driving.path import (
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to, way_to_pose
 from mav_tasks.tasks.goal import Face, GoTo, LocalPlace, Move, Plan, Rotate, SingleGoal
-from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress, Task
-from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.view import VehicleView, place_of
 
 #: rad; a car stops before a larger turn: it may be shorter to reverse
 ROLLING_TURN = radians(100)

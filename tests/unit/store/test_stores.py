@@ -16,10 +16,13 @@ from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, Which, kind_of, open_store
 from mav_tasks.tasks.events import (
     Event,
+    ParameterSet,
     PlanStored,
     QueueContinued,
     QueuePaused,
     ServerStopped,
+    SignaturesSeen,
+    SignatureTime,
     SubmissionRefused,
     TaskAdvanced,
     TaskModified,
@@ -33,7 +36,6 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen, SignatureTime
 from mav_tasks.tasks.task import MAX_TASK_ID, Pose, Progress, TaskId, Terms
 from tests.kit.databases import locked, tables
 from tests.unit.store.samples import (
