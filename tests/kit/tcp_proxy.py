@@ -28,9 +28,6 @@ class TcpProxy:
         self._thread = Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def __repr__(self) -> str:
-        return f"TcpProxy({self.port}, {len(self._pairs) // 2} connections)"
-
     def fall_silent(self) -> None:
         """Forward nothing of the connections that exist, for good, and close none of them."""
         self._is_silent.set()

@@ -36,11 +36,6 @@ def without_collector() -> Iterator[None]:
             gc.enable()
 
 
-def always(_state: State) -> bool:
-    """Return True."""
-    return True
-
-
 def can_happen(event: Event, state: State) -> bool:
     """Return whether an event is possible in a state; requests always are."""
     has_task = state.work not in (Work.NONE, Work.WAITS)
@@ -144,11 +139,11 @@ class Graph:
                         self.paths[there] = (*self.paths[state], name)
                         waiting.append(there)
 
-    def __repr__(self) -> str:
-        return f"Graph({len(self.paths)} states)"
-
     def leading_to(
-        self, wanted: Callable[[State], bool], *names: str, within: Callable[[State], bool] = always
+        self,
+        wanted: Callable[[State], bool],
+        *names: str,
+        within: Callable[[State], bool] = lambda _state: True,
     ) -> set[State]:
         """Return the states from which transitions with these names lead to a wanted state.
 
