@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import hypot
 
 from mav_tasks.errors import Rejection
-from mav_tasks.latest import keep_latest
+from mav_tasks.latest import keep_latest, shorten
 from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import GlobalPlace, GoTo
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
@@ -26,7 +26,7 @@ SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
 #: person without an answer tries again within minutes
 NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
-RECENT = 3_000  # entries of one client; CommandReceiver has a list, too, but not after a restart
+RECENT = 1_000  # marks of one client; CommandReceiver has a list, too, but not after a restart
 SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
 MANY_CLIENTS = 256  # remembered; beyond this, those with the oldest submissions are forgotten
 
@@ -107,7 +107,7 @@ class SubmissionDeduplicator:
         ):
             # copies of this command may follow
             copy = _Last(goal.task_id, draft, now, is_told=True)
-            client[draft.vehicle, draft.command] = copy
+            keep_latest(client, (draft.vehicle, draft.command), copy, most=RECENT)
             return goal.repeated("goal")
         return None
 
@@ -126,12 +126,14 @@ class SubmissionDeduplicator:
         vehicle = task.submitted_to
         draft = Draft(vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
-        if is_place:
-            client[vehicle] = last
-        if not marks.nonce:
-            client[vehicle, task.command] = last
-        if marks.packet and not marks.nonce:
-            keep_latest(client, marks.packet, last, most=RECENT)
+        place = vehicle if is_place else ""
+        found = (place,) if marks.nonce else (place, (vehicle, task.command), marks.packet)
+        for mark in found:
+            if mark != "":
+                client.pop(mark, None)  # it is the newest now
+                client[mark] = last
+        if len(client) > RECENT:
+            shorten(client, RECENT)
 
     def held(self, submitter: Submitter, vehicle: int) -> None:
         """Forget a client's last return after its halt: the next return is new (rule 4).
