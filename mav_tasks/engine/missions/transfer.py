@@ -171,6 +171,9 @@ class Transfer:
         self._past: dict[Sender, _Past] = {}
         self._downloads: dict[Sender, tuple[str, float]] = {}  # items, and when it went on
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.address}, type {self.kind}, {self.upload})"
+
     def check(self, upload: Upload, item: Item) -> None:
         """Raise Rejection if an item may not be the next one of an upload."""
         raise NotImplementedError
