@@ -29,7 +29,6 @@ R = TaskReason
 START_WITHIN = 10.0  # s, in which the arming must come that starts a mission
 SHOWN_FOR = 1.2  # s, in which heartbeats at 1 Hz show a mode at least once
 CRUISING = Terms(is_cruising=True)
-STOPPED = Rejection(R.STOPPED, CONTINUE_FIRST)
 
 
 @dataclass(repr=False, eq=False)
@@ -58,7 +57,7 @@ class ModeRequests:
             asked.answer(MavResult.ACCEPTED, paused or 0)
             return True
         if vehicle.tasks.is_stopped:
-            raise STOPPED
+            raise Rejection(R.STOPPED, CONTINUE_FIRST)
         if self._is_return(vehicle, mode):
             self._submissions.run_now(asked, _return_home(asked), now=now)
             self._show(vehicle, mode, now=now)
