@@ -417,9 +417,11 @@ class VehicleSide(VehicleLinks):
         self._registry.record(VehicleSeen(number, f"found ({persona.name})", now))
         for moved in self._strangers.take_motion(number, place, now=now):
             vehicle.where.receive(moved.message, now=moved.at, not_after=moved.at)
-        was_driven = self._fleet.was_driven(number)
-        halt = self._fleet.last_halt(number, now=now)
-        vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
+        vehicle.come_back(
+            was_driven=self._fleet.was_driven(number),
+            halt=self._fleet.last_halt(number, now=now),
+            now=now,
+        )
         vehicle.joint.step(now)
         return vehicle
 
