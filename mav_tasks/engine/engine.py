@@ -61,7 +61,9 @@ class Engine:
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         earlier = restored or Restored()
-        configured, (settings, _) = settings, with_all(settings, earlier.parameters)
+        configured, (settings, why_not) = settings, with_all(settings, earlier.parameters)
+        #: why the latest settings override parameters that clients set
+        self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
         self._packets: list[Outgoing] = []
         self._intake = PacketReader()
@@ -151,11 +153,6 @@ class Engine:
         """Parameter values that clients have set, by name; they override the configuration."""
         return self._parameters.in_force
 
-    @property
-    def not_in_force(self) -> tuple[str, ...]:
-        """Why the settings override parameters that clients have set."""
-        return self._parameters.not_in_force
-
     def handle(self, item: Input, *, now: float) -> None:
         """Process one input."""
         self._begin(now=now)
@@ -206,6 +203,7 @@ class Engine:
                     self._questions.answered(now=now)
             case inputs.ParametersChanged(values=values):
                 self._parameters.share(dict(values))
+                self.not_in_force = self._parameters.not_in_force
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.NonceTaken():
@@ -213,6 +211,7 @@ class Engine:
                 self._any.nonce_taken(item, now=now)
             case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
+                self.not_in_force = self._parameters.not_in_force
             case inputs.WallClock(offset=offset):
                 self.signatures.set_wall(offset)
                 self._fleet.room.set_wall_offset(offset, now=now)
