@@ -111,8 +111,9 @@ class Rights(NamedTuple):
         for kind in kinds:
             if kind not in limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
-        for role in (OPERATOR, SAFETY):
-            if Perform(role) in steps:
+        roles = {step.role for step in steps if isinstance(step, Perform)}
+        for role in (OPERATOR, SAFETY) if roles else ():
+            if role in roles:
                 what = "" if role == OPERATOR else f" for {role}"
                 self.require(role, f"send a plan that contains rover commands{what}", moves=True)
         top = limits.max_speed
