@@ -101,6 +101,16 @@ class TestTurning:
         assert world.state(1)[0] is S.COMPLETED
         assert near_pose(world.pose(), (0.0, 0.0, angle))
 
+    def test_it_goes_on_with_a_turn_where_somebody_has_carried_it(self, world: World) -> None:
+        world.run(2.0)
+        world.client.rotate(150.0)
+        world.until(lambda: world.truth.yaw > 0.7, within=9)
+        world.client.pause()
+        world.run(3.0)
+        vars(world.rover.body)["_north"] += 0.1
+        world.client.proceed()
+        world.until_state(1, S.COMPLETED)
+
 
 class TestMovingBackwards:
     """It does not reverse: a differential one turns round, drives, and turns back."""

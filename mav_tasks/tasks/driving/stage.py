@@ -193,7 +193,7 @@ def recovery_path(
         there = replace(anchor, yaw=wrap(anchor.yaw + copysign(progress.done, leg.angle)))
         if distance(pose, there) <= ON_SPOT and not _is_turned(pose, there, TURNED):
             return None
-        return _way_back(there, pose, by_course=False, steering=None)
+        return _way_back(there, pose, by_course=not honours_yaw_rate, steering=None)
     if not isinstance(leg, Move):
         return None
     along, beside = _place_at(leg, anchor, pose)

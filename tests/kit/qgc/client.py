@@ -31,9 +31,6 @@ class Qgc:
         if dials:
             self._beat()
 
-    def __repr__(self) -> str:
-        return f"Qgc({self.profile.name}, {sorted(self.vehicles)}, {self.screen!r})"
-
     def receive(self, data: bytes, *, now: float) -> None:
         """Take a datagram, any bytes."""
         self.handle_deadline(now=now)

@@ -28,9 +28,6 @@ class QgcParty:
         self._server = server
         self._flush()
 
-    def __repr__(self) -> str:
-        return f"QgcParty({self.name}, {self.qgc!r})"
-
     @property
     def vehicle(self) -> Session:
         """The only vehicle, brought up to the present time."""

@@ -28,9 +28,6 @@ class Screen:
         #: not shown: what no ground station should receive, or have to do
         self.violations: list[Shown] = []
 
-    def __repr__(self) -> str:
-        return f"Screen({len(self.popups)} popups, {len(self.violations)} violations)"
-
     @property
     def complaints(self) -> list[str]:
         """Popups and violations, in words."""

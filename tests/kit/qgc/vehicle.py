@@ -50,10 +50,6 @@ class VehicleState:
         self.plan_completed = False
         self._take_heartbeat(heartbeat)
 
-    def __repr__(self) -> str:
-        armed = "armed" if self.armed else "disarmed"
-        return f"VehicleState({self.firmware}, {armed}, mode {self.mode:#x})"
-
     @property
     def modes(self) -> Modes | None:
         """The modes that the station knows by name."""
