@@ -401,7 +401,7 @@ def test_a_mission_goes_up_waits_is_driven_and_comes_back(server: str, tmp_path:
     for name in ("back.waypoints", "back.plan"):
         back = tmp_path / name
         done = called("mission", "download", str(back), server=server)
-        assert done.lines == [f"{back}: 2 items"]
+        assert done.lines == [f"{back}: 2 items"], done.error
         assert read_plan(back).items == read_plan(way).items
     again = called("mission", "download", str(back), server=server)
     assert_one_line(again, 2, str(back), "--force")
