@@ -6,9 +6,9 @@ directly or through others.
 
 In a fleet a task may run after one of a vehicle that another gateway has. The registry lacks that
 one; the fleet's store says how it stands, and ``expected`` are the tasks that it is asked about. A
-task that the registry lacks counts as not over until the store says that it is: whoever has lost
-sight of a task must not start what waits for it. What the store says never turns back: a task is
-there, and later it has ended.
+task that the registry lacks counts as not over until the store says that it is: a server that does
+not know how a task stands must not start what waits for that task. What the store says never turns
+back: a task is there, and later it has ended.
 
 Dependencies have no circle. A new task may name only one that exists, so none waits for it yet. A
 waiting task may be changed to run after another one only if all that this one waits for is known

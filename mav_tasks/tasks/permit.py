@@ -1,6 +1,7 @@
-"""What may still happen to a vehicle because somebody asked for it: until a time, or the next halt.
+"""Permits: what may still happen to a vehicle because somebody asked for it.
 
-A permit holds the term in which it was given. One of another term is none: nobody deletes it.
+A permit ends at a given time, or with the vehicle's next halt. It remembers the term, the number of
+halts until then, in which it was given. A halt changes the term, so no code has to delete permits.
 """
 
 from math import inf
@@ -12,7 +13,7 @@ T = TypeVar("T")
 
 
 class Permit(Generic[T]):
-    """One permit for one vehicle: who has it, or what it is about."""
+    """A permit for one vehicle. Its holder is the client that has it, or what is permitted."""
 
     def __init__(self, halts: Halts) -> None:
         self._halts = halts
@@ -23,14 +24,17 @@ class Permit(Generic[T]):
         return f"Permit({self._holder}, until={self._until:.2f})"
 
     def give(self, holder: T, *, until: float = inf) -> None:
-        """Give it, in place of the last."""
+        """Give the permit to a holder; this replaces the previous holder."""
         self._holder, self._term, self._until = holder, self._halts.term, until
 
     def end(self) -> None:
-        """End it, because something else was requested since."""
+        """End the permit, because something else was requested since."""
         self._holder = None
 
     def holder(self, *, now: float, halts: int = 0) -> T | None:
-        """Return whose it is, None if it is nobody's any more; ``halts``: after so many halts."""
+        """Return the holder, or None if the permit has ended.
+
+        ``halts``: return the holder of a permit that was given exactly so many halts ago.
+        """
         is_of_now = self._term + halts == self._halts.term and now < self._until
         return self._holder if is_of_now else None

@@ -370,7 +370,8 @@ class PlanTransfer(Transfer):
             fence_of(items)
             for_vehicle = fence_for_vehicle(items)
 
-        def write_next(result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:  # noqa: ARG001  # the vehicle's
+        # opaque_id is the vehicle's own id of the plan, which means nothing to clients
+        def write_next(result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:  # noqa: ARG001
             if result is None:
                 words = f"rover {vehicle.system_id} did not answer: not stored"
                 answer(Rejection(R.VEHICLE_SILENT, words), now=now)

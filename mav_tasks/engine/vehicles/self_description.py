@@ -121,7 +121,7 @@ class SelfDescription:
         return with_turning(persona, turning, radius=self._says.turning_radius)
 
     def _words_of_profile(self) -> str:
-        """Return which profile is used, or why none is; "" if there is none."""
+        """Return which profile is used, or why it is ignored; "" if there is no profile."""
         if self._chosen is not None:
             words = f"uses the profile of {self._chosen.probed[:10]}"
             return words + ": does not stop without setpoints" * self._is_known_to_drive_on
