@@ -69,7 +69,9 @@ def wait_until(
     end = time.monotonic() + BUSY * within
     while not (answer := condition()):
         if time.monotonic() > end:
-            raise AssertionError(f"not in {BUSY * within} s: {what() if callable(what) else what}")
+            raise AssertionError(
+                f"not in {BUSY * within:g} s: {what() if callable(what) else what}"
+            )
         time.sleep(0.02)
     return answer
 
@@ -293,7 +295,7 @@ def wait_for(
     """Wait for a message of a type; return it."""
     limit = BUSY * within
     message = link.recv_match(type=kind, condition=condition, blocking=True, timeout=limit)
-    assert message is not None, f"no {kind} ({condition}) in {limit} s"
+    assert message is not None, f"no {kind} ({condition}) in {limit:g} s"
     return message
 
 
