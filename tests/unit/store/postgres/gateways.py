@@ -69,10 +69,14 @@ class Gateway:
 
     def asks(self, request: Request) -> Answer:
         """Ask for a lease, and again after no answer in time, as a gateway does."""
+        is_away = bool(self.leases.late)
         for _ in range(PATIENT):
             with suppress(PostgresError):
+                if is_away:
+                    self.leases.connect()
                 return self.leases.execute(request)
-            self.leases.connect()
+            is_away = True
+        self.leases.connect()
         return self.leases.execute(request)
 
     def open(self, url: str | None = None, *, wall_offset: float = OFFSET) -> None:
