@@ -8,6 +8,7 @@ again after BUSY_AGAIN.
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 from mav_tasks.client.mission_downloader import MissionDownloader
 from mav_tasks.mavlink import messages as m
@@ -108,8 +109,9 @@ class Transfers:
     def next_deadline(self) -> float | None:
         """Return when to call ``handle_deadline``; None: nothing is pending."""
         begin_at = self._rests_until if self._waiting else None
-        due = (self._uploader.next_deadline(), self._downloader.next_deadline(), begin_at)
-        return min((at for at in due if at is not None), default=None)
+        upload = self._uploader
+        due = (upload.again_at, upload.give_up_at, self._downloader.next_deadline(), begin_at)
+        return min((at for at in due if at is not None and at < inf), default=None)
 
     def handle_deadline(self, *, now: float) -> None:
         """Repeat what is due, and start the next transfer."""

@@ -474,9 +474,11 @@ class Engine:
                 woken.joint.wake(now=now)
         for vehicle in self._vehicles.settle() if self._vehicles.touched else ():
             self._modes.look_for_arming(vehicle, now=now)
-            for answered in vehicle.requests.take_answers():
-                deliver(self._gcs, self._submissions, vehicle, answered, now=now)
-            self._reports.tell_unperformed(vehicle, now=now)
+            answers, unperformed = vehicle.requests.answers, vehicle.requests.unperformed
+            while answers:
+                deliver(self._gcs, self._submissions, vehicle, answers.pop(0), now=now)
+            if unperformed:
+                self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by < inf:
             self._note_stopped(now=now)
         while signatures.refused:

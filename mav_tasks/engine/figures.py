@@ -90,7 +90,7 @@ class Figures:
             paused=tasks.paused,
             tasks=tuple(
                 (state, reason, count)
-                for (state, reason), count in tally(tasks, self._registry.counts(system_id)).items()
+                for (state, reason), count in tally(tasks, self._registry.counts[system_id]).items()
             ),
             intervals=tasks.executor.intervals.figures(),
             period=tasks.settings.watch.setpoint_period,

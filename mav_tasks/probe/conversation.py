@@ -118,9 +118,8 @@ class Conversation:
         self._take_answers()
 
     def next_deadline(self) -> float:
-        due = [self._heartbeat.next_deadline(), self._text_receiver.next_deadline()]
-        at = self.sender.next_deadline()
-        return min(due if at is None else [*due, at])
+        beat_at, text_at = self._heartbeat.next_deadline(), self._text_receiver.next_deadline()
+        return min(beat_at, text_at, self.sender.next_deadline())
 
     def take_packets(self) -> list[bytes]:
         """Return what is to be sent since the last call, in order."""

@@ -250,8 +250,9 @@ class CommandSender:
             if lane.in_flight is None and not lane.waiting and now >= lane.quiet_until:
                 del self._lanes[key]
 
-    def next_deadline(self) -> float | None:
-        deadlines: list[float] = []
+    def next_deadline(self) -> float:
+        """Return when something is to be repeated or given up, s; inf without a command."""
+        deadlines = [inf]
         for lane in self._lanes.values():
             if lane.in_flight is not None:
                 deadlines.append(lane.in_flight.retry.next_deadline())
@@ -260,7 +261,7 @@ class CommandSender:
                 deadlines.append(min(request.wait_until for request in lane.waiting))
                 if lane.in_flight is None:
                     deadlines.append(lane.quiet_until)
-        return min(deadlines, default=None)
+        return min(deadlines)
 
     def take(self) -> tuple[list[Message | Packet], list[Answered]]:
         """Return what is to be sent, and what was answered, since the last call."""

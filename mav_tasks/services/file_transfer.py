@@ -20,18 +20,13 @@ GIVEN_UP = 10.0  # s without a request, after which an autopilot itself may end 
 READING = frozenset({0, 1, 3, 4, 5, 14, 15})
 #: offsets in the payload: session after a 16-bit sequence number, then the opcode
 SESSION, OPCODE, DATA = 2, 3, 12
-BURST_READ = 15  # a whole file, unasked for each piece
+BURST_READ = 15  # a whole file: one request is answered by many packets
 PARAMETERS = list(b"@PARAM/param.pck")  # ArduPilot's file of all parameters; options may follow
 
 
 def reads(request: m.FileTransferProtocol) -> bool:
     """Whether a request changes no file."""
     return request.payload[OPCODE] in READING
-
-
-def is_burst(request: m.FileTransferProtocol) -> bool:
-    """Whether one request is answered by many packets."""
-    return bool(request.payload[OPCODE] == BURST_READ)
 
 
 def opens_parameters(request: m.FileTransferProtocol) -> bool:

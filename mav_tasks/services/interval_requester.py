@@ -59,7 +59,8 @@ class IntervalRequester:
         self._tries: dict[int, int] = {}  # left, of what is to come less often
         self._refused: dict[int, float] = {}  # the longest interval refused, by message
         self._count: dict[int, int] = {}
-        self._check_at = now + CHECK
+        #: s, when the rates are looked at again
+        self.check_at = now + CHECK
         self._asked: int | None = None
 
     def set_wishes(self, wishes: Mapping[int, float]) -> None:
@@ -95,7 +96,7 @@ class IntervalRequester:
 
     def next_request(self, *, now: float) -> m.CommandLong | None:
         """Return the next request to send (its target still 0/0), or None if none is due now."""
-        if now >= self._check_at:
+        if now >= self.check_at:
             self._check(now)
         if self._asked is not None:
             return None
@@ -134,12 +135,8 @@ class IntervalRequester:
             self._wanted[asked] = own
             self._needed[asked] = None
 
-    def next_deadline(self) -> float:
-        """Return when the rates are looked at again."""
-        return self._check_at
-
     def _check(self, now: float) -> None:
-        seconds = CHECK + now - self._check_at
+        seconds = CHECK + now - self.check_at
         for message_id, interval in self._wanted.items():
             expected = seconds / interval
             if (
@@ -151,4 +148,4 @@ class IntervalRequester:
                 pile = self._needed if message_id in WANTED else self._changed
                 pile[message_id] = None
         self._count.clear()
-        self._check_at = now + CHECK
+        self.check_at = now + CHECK

@@ -55,8 +55,8 @@ class MissionUploader:
         self._waiting: deque[tuple[int, tuple[Item, ...], Done]] = deque()
         self._outgoing: list[m.Message] = []
         # of the first one:
-        self._again_at = inf  # when the count, or the last item, is sent again
-        self._give_up_at = inf
+        self.again_at = inf  #: s, when the count, or the last item, is sent again
+        self.give_up_at = inf  #: s, when it has failed
         self._over_at = inf
         self._is_asked = False
         self._is_sent = False  # whole: its last item has been asked for and sent
@@ -78,7 +78,7 @@ class MissionUploader:
         match message:
             case m.MissionRequest() | m.MissionRequestInt() if message.seq < len(items):
                 self._is_asked = True
-                self._give_up_at = min(now + self._patience.give_up, self._over_at)
+                self.give_up_at = min(now + self._patience.give_up, self._over_at)
                 self._send(message.seq, now=now)
             case m.MissionAck():
                 # one of an earlier upload may come late
@@ -88,16 +88,13 @@ class MissionUploader:
                     result = next(known, MavMissionResult.ERROR)
                     self._end(result, opaque_id=message.opaque_id, now=now)
 
-    def next_deadline(self) -> float | None:
-        return min(self._again_at, self._give_up_at) if self._waiting else None
-
     def handle_deadline(self, *, now: float) -> None:
         """Offer it again, and give up in the end."""
-        if now >= self._give_up_at:
+        if now >= self.give_up_at:
             self._end(None, opaque_id=0, now=now)
-        elif now >= self._again_at and self._is_asked:
+        elif now >= self.again_at and self._is_asked:
             self._send(-1, now=now)
-        elif now >= self._again_at:
+        elif now >= self.again_at:
             self._offer(now=now)
 
     def take(self) -> list[m.Message]:
@@ -106,28 +103,28 @@ class MissionUploader:
         return outgoing
 
     def _start(self, *, now: float) -> None:
-        self._give_up_at = now + self._patience.give_up
+        self.give_up_at = now + self._patience.give_up
         self._over_at = now + self._patience.at_most
         self._is_asked = self._is_sent = False
         self._offer(now=now)
 
     def _offer(self, *, now: float) -> None:
         mission_type, items, _ = self._waiting[0]
-        self._again_at = now + self._patience.count_again
+        self.again_at = now + self._patience.count_again
         self._outgoing.append(m.MissionCount(*self._target, len(items), mission_type))
 
     def _send(self, seq: int, *, now: float) -> None:
         """Send an item; -1: the last one."""
         mission_type, items, _ = self._waiting[0]
         seq %= len(items)
-        self._again_at = inf
+        self.again_at = inf
         if seq == len(items) - 1:
-            self._is_sent, self._again_at = True, now + self._patience.last_again
+            self._is_sent, self.again_at = True, now + self._patience.last_again
         self._outgoing.append(message_of(items[seq], seq, mission_type, to=self._target))
 
     def _end(self, result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:
         _, _, done = self._waiting.popleft()
-        self._again_at = self._give_up_at = inf
+        self.again_at = self.give_up_at = inf
         if self._waiting:
             self._start(now=now)
         done(result, opaque_id=opaque_id, now=now)

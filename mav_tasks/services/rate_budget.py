@@ -14,7 +14,7 @@ from math import inf
 from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.packet import CRC, HEADER_V2, Packet
-from mav_tasks.services import file_transfer
+from mav_tasks.services.file_transfer import BURST_READ, OPCODE
 from mav_tasks.services.interval_requester import SHORTEST, WANTED
 from mav_tasks.services.token_bucket import TokenBucket
 
@@ -64,7 +64,9 @@ class LinkBudget:
         self, who: Hashable, packet: Packet, message: m.Message, *, is_driven: bool, now: float
     ) -> str | None:
         """Return why an observer's request may not be forwarded now, or None if it may."""
-        is_file = isinstance(message, m.FileTransferProtocol) and file_transfer.is_burst(message)
+        is_file = (
+            isinstance(message, m.FileTransferProtocol) and message.payload[OPCODE] == BURST_READ
+        )
         if not is_file and not isinstance(message, m.ParamRequestList | m.MissionRequestList):
             size = len(packet.raw) + _size_of_answer(message)
             own, rate = self._own.get(who), self._rate

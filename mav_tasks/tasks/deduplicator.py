@@ -4,9 +4,10 @@ The rules are those of ``dialects/README.md``, "Duplicate detection". The tasks 
 that the rules need, so that a restart forgets nothing.
 """
 
-from collections.abc import Container, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, field
 from math import hypot
+from operator import attrgetter
 
 from mav_tasks.errors import Rejection
 from mav_tasks.latest import keep_latest, shorten
@@ -14,7 +15,7 @@ from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import GlobalPlace, GoTo
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
+from mav_tasks.tasks.task import ANY, Draft, Submitter, Task, TaskId
 
 SAME_PACKET = 5.0  # s, the identical packet again (rule 1)
 CONFIRMED = 10.0  # s, confirmation > 0 with equal parameters (rule 3)
@@ -60,6 +61,10 @@ class _Last:
 #: under which a submission is remembered: a packet, or the vehicle (or ANY) that was to go to a
 #: place, or that vehicle and a command
 _Mark = str | int | tuple[int, int]
+#: whose a nonce is: not its endpoint's, for a client may come back from another one
+_client: Callable[[Submitter], tuple[str, int, int]] = attrgetter(
+    "fingerprint", "system_id", "component_id"
+)
 
 
 class SubmissionDeduplicator:
@@ -68,7 +73,7 @@ class SubmissionDeduplicator:
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
         self._clients: dict[Submitter, dict[_Mark, _Last]] = {}
-        self._nonces: dict[tuple[str, int, int, int], TaskId] = {}
+        self._nonces: dict[tuple[tuple[str, int, int], int], TaskId] = {}
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Load the tasks of an earlier run, oldest first: all nonces, and recent submissions."""
@@ -87,7 +92,15 @@ class SubmissionDeduplicator:
         Rejection(NONCE_REUSED) if the nonce was used for something else.
         """
         if draft.marks.nonce:
-            return self._by_nonce(draft, now=now)
+            nonce = _client(draft.submitter), draft.marks.nonce
+            task = self._registry.get(self._nonces.get(nonce, 0))
+            # that of a task that is long over may be used for a new submission
+            if task is None or (task.state in TERMINAL and now - task.ended_at > NONCE_KEPT):
+                self._nonces.pop(nonce, None)
+                return None
+            if task.marks.payload != draft.marks.payload:
+                raise reused(draft.marks.nonce)
+            return Known(task.id)
         client = self._clients.get(draft.submitter, {})
         same = client.get(draft.marks.packet)
         if same is not None and now - same.at <= SAME_PACKET:
@@ -115,7 +128,7 @@ class SubmissionDeduplicator:
         """Remember a submission that became a task."""
         submitter, marks = task.submitter, task.marks
         if marks.nonce:
-            self._nonces[_key(submitter, marks.nonce)] = task.id
+            self._nonces[_client(submitter), marks.nonce] = task.id
             if len(self._nonces) > SPARE:
                 self._forget_nonces()
         is_place = isinstance(task.goal, GoTo)
@@ -123,7 +136,7 @@ class SubmissionDeduplicator:
             return  # its nonce alone identifies it
         client = self._clients.get(submitter, {})
         keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
-        vehicle = task.submitted_to
+        vehicle = ANY if task.choice else task.vehicle  # as its submitter named it
         draft = Draft(vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
         place = vehicle if is_place else ""
@@ -148,7 +161,7 @@ class SubmissionDeduplicator:
     def forget(self, task: Task) -> None:
         """Forget a submission that was refused after all, so that the client may try it again."""
         if task.marks.nonce:
-            self._nonces.pop(_key(task.submitter, task.marks.nonce), None)
+            self._nonces.pop((_client(task.submitter), task.marks.nonce), None)
         client = self._clients.get(task.submitter, {})
         for mark in [mark for mark, each in client.items() if each.task_id == task.id]:
             del client[mark]
@@ -163,17 +176,6 @@ class SubmissionDeduplicator:
                 if each.draft.vehicle != vehicle and each.task_id not in tasks
             }
 
-    def _by_nonce(self, draft: Draft, *, now: float) -> Known | None:
-        key = _key(draft.submitter, draft.marks.nonce)
-        task_id = self._nonces.get(key)
-        task = None if task_id is None else self._registry.get(task_id)
-        if task is None or _is_long_over(task, now=now):
-            self._nonces.pop(key, None)
-            return None
-        if task.marks.payload != draft.marks.payload:
-            raise reused(draft.marks.nonce)
-        return Known(task.id)
-
     def _forget_nonces(self) -> None:
         if len(self._nonces) > 2 * len(self._registry) + SPARE:  # most are of forgotten tasks
             kept = {k: t for k, t in self._nonces.items() if self._registry.get(t) is not None}
@@ -183,16 +185,6 @@ class SubmissionDeduplicator:
 def reused(nonce: int) -> Rejection:
     """Return the refusal of a nonce that another submission has."""
     return Rejection(TaskReason.NONCE_REUSED, f"nonce {nonce} was used for another task")
-
-
-def _is_long_over(task: Task, *, now: float) -> bool:
-    """Return whether the nonce of a finished task may be used for a new submission."""
-    return task.state in TERMINAL and now - task.ended_at > NONCE_KEPT
-
-
-def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
-    """Return a key without the endpoint: a client may come back from another one."""
-    return submitter.fingerprint, submitter.system_id, submitter.component_id, nonce
 
 
 def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:

@@ -90,7 +90,7 @@ class Fleet:
             self._registry.ids.share()
             self.room.is_shared = True
         else:
-            self._registry.ids.count_from(restored.next_id)
+            self._registry.ids.next = restored.next_id
         is_unclean = self._settings.on_restart == "pause" and not restored.ended_well
         self.began_at = now
         self._load(restored, is_unclean=is_unclean, now=now)

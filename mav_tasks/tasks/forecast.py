@@ -34,7 +34,6 @@ class Forecast:
         self._tasks = tasks
         self._registry = registry
         self._now = now
-        self._known = known_of(tasks)
         self._played: tuple[dict[TaskId, Times], Estimate] | None = None  # not computed yet
         self._ready: list[tuple[Rank, TaskId]] = []
         self._due: list[tuple[float, TaskId]] = []  # seconds from now
@@ -55,20 +54,16 @@ class Forecast:
         """
         return UNKNOWN if len(self._tasks.queue) > FEW else self._outcome()[1]
 
-    def known_when_empty(self) -> Known:
-        """Return from where a new task is driven: where those before it end, else from here."""
-        return self._known._replace(pose=self.when_empty().pose or self._known.pose)
-
     def _outcome(self) -> tuple[dict[TaskId, Times], Estimate]:
         if self._played is None:
-            self._played = self._play()
+            self._played = self._play(known_of(self._tasks))
         return self._played
 
-    def _play(self) -> tuple[dict[TaskId, Times], Estimate]:
+    def _play(self, known: Known) -> tuple[dict[TaskId, Times], Estimate]:
         """Return all times, and when no task is ready for the first time."""
         times: dict[TaskId, Times] = {}
         self._line_up(times)
-        clock, pose, _ = self._when_free()
+        clock, pose, _ = self._when_free(known)
         empty = None if self._ready else Estimate(clock, pose)
         while not isnan(clock) and (self._ready or self._due) and len(times) < FORESEEN:
             if not self._ready:
@@ -78,7 +73,7 @@ class Forecast:
             if not self._ready:
                 continue
             task = self._registry[heappop(self._ready)[1]]
-            seconds, pose, _ = time_left(task.goal, task.progress, self._known._replace(pose=pose))
+            seconds, pose, _ = time_left(task.goal, task.progress, known._replace(pose=pose))
             times[task.id] = (clock, clock + seconds)
             clock += seconds
             self._done.add(task.id)
@@ -125,7 +120,7 @@ class Forecast:
         self._dependents.setdefault(ahead.id, []).append(task)
         return True
 
-    def _when_free(self) -> Estimate:
+    def _when_free(self, known: Known) -> Estimate:
         """Return when and where the vehicle is free for a task; UNKNOWN if nothing can run."""
         tasks = self._tasks
         is_up = tasks.seen is not None and tasks.seen.heard
@@ -135,12 +130,12 @@ class Forecast:
         if active is None:
             first = tasks.queue.first()
             blocked = first is not None and tasks.blocker_of(first)
-            return UNKNOWN if blocked else Estimate(0.0, self._known.pose)
+            return UNKNOWN if blocked else Estimate(0.0, known.pose)
         if active.state is S.CANCELLING:
-            return Estimate(SETTLING, self._known.pose)
+            return Estimate(SETTLING, known.pose)
         if active.state not in (S.STARTING, S.EXECUTING) or tasks.blocker_of(active.id):
             return UNKNOWN
-        return time_left(active.goal, active.progress, self._known)
+        return time_left(active.goal, active.progress, known)
 
 
 def known_of(tasks: VehicleTasks) -> Known:
@@ -150,6 +145,12 @@ def known_of(tasks: VehicleTasks) -> Known:
         return Known(tasks.driving)
     pose = None if seen.motion is None else seen.motion.pose
     return Known(tasks.driving, pose, seen.home, seen.origin)
+
+
+def known_when_empty(tasks: VehicleTasks, registry: TaskRegistry, *, now: float) -> Known:
+    """Return from where a new task is driven: where those before it end, else from here."""
+    known = known_of(tasks)
+    return known._replace(pose=Forecast(tasks, registry, now=now).when_empty().pose or known.pose)
 
 
 def position(tasks: VehicleTasks, task: Task) -> int | None:
@@ -191,7 +192,15 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
         case S.BLOCKED:
             return R.WAITING_FOR_START if task.terms.is_staged else R.DEPENDENCY
         case S.QUEUED:
-            return _why_queued(tasks, task)
+            if tasks.is_held_ahead:
+                return R.HELD_AHEAD
+            if tasks.paused and task.id != tasks.immediate:
+                return R.RESTARTED if tasks.paused is R.RESTARTED else R.QUEUE_PAUSED
+            if tasks.stopping_after_kill:
+                return R.STOP_UNCONFIRMED
+            if tasks.executor.task_id is not None or tasks.queue.position(task.id):
+                return R.BEHIND_OTHERS
+            return tasks.blocker_of(task.id)
         case S.HELD | S.STARTING:
             return tasks.blocker_of(task.id) or task.reason
         case _:
@@ -212,19 +221,7 @@ def tally(tasks: VehicleTasks, counts: Sequence[int]) -> Counter[tuple[TaskState
         }
     )
     for task_id, count in zip(tasks.queue.page(0, 2), (1, counts[S.QUEUED] - 1), strict=False):
-        found[S.QUEUED, _why_queued(tasks, tasks.registry[task_id])] += count
+        found[S.QUEUED, wait_reason(tasks, tasks.registry[task_id])] += count
     for task in tasks.begun:
         found[task.state, wait_reason(tasks, task)] += 1
     return +found
-
-
-def _why_queued(tasks: VehicleTasks, task: Task) -> TaskReason:
-    if tasks.is_held_ahead:
-        return R.HELD_AHEAD
-    if tasks.paused and task.id != tasks.immediate:
-        return R.RESTARTED if tasks.paused is R.RESTARTED else R.QUEUE_PAUSED
-    if tasks.stopping_after_kill:
-        return R.STOP_UNCONFIRMED
-    if tasks.executor.task_id is not None or tasks.queue.position(task.id):
-        return R.BEHIND_OTHERS
-    return tasks.blocker_of(task.id)

@@ -81,7 +81,7 @@ class Halts:
         self.is_undone = False  #: the queue was resumed since
         self.restored_at = -inf  #: s, when this run loaded an earlier one
         self._reason, self._actor = TaskReason.NONE, ""
-        self._was_asked = False  # to resume, since the last halt
+        self.was_asked = False  #: to resume, since the last halt, whether that was accepted or not
         self._counted_at = -inf  # s, when the last halt came that counted
 
     def __repr__(self) -> str:
@@ -111,12 +111,12 @@ class Halts:
             self.by_somebody = LastHalt(self.by_somebody.reason if is_word else reason, now)
         self.at = now  # a repeated halt, too, makes older commands stale
         is_same = (reason, actor) == (self._reason, self._actor)
-        if is_same and now - self._counted_at < SAME and not self._was_asked:
+        if is_same and now - self._counted_at < SAME and not self.was_asked:
             return False
         self.epoch += 1
         self._counted_at = now
         self.by, self.number, self.command = None, -1, 0
-        self._reason, self._actor, self._was_asked = reason, actor, False
+        self._reason, self._actor, self.was_asked = reason, actor, False
         self.is_undone = False
         return True
 
@@ -135,7 +135,3 @@ class Halts:
             self.command = command
         self.by, self.number = sender, max(number, before)
         keep_latest(self._numbers, sender, self.number, most=SENDERS)
-
-    def was_asked_to_go_on(self) -> None:
-        """Note a request to resume, whether it was accepted or not."""
-        self._was_asked = True

@@ -28,6 +28,7 @@ from mav_tasks.tasks.goal import SingleGoal
 from mav_tasks.tasks.halts import DISABLED, Halts
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks
+from mav_tasks.tasks.permit import Permit
 from mav_tasks.tasks.queue import TaskQueue, outranks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Task, TaskId, same_frame
@@ -54,7 +55,6 @@ class Released(NamedTuple):
     actor: str
     until: float
     waits_for: TaskReason
-    term: int  # in which it was released
 
 
 class Lineup:
@@ -90,7 +90,7 @@ class Lineup:
         #: a task was killed: nothing starts before the vehicle stands, or a takeover
         self.stopping_after_kill = False
         #: a held task that waits until the vehicle has rebooted, or the queue resumes
-        self.last_released: Released | None = None
+        self.release_permit = Permit[Released](self.halts)
         #: the vehicle at the last step
         self.seen: VehicleView | None = None
         self._jumps = JumpWatch()
@@ -128,8 +128,7 @@ class Lineup:
     @property
     def released(self) -> Released | None:
         """The last release, while its task waits and nothing has halted the vehicle since."""
-        last = self.last_released
-        return last if last is not None and last.term == self.halts.term else None
+        return self.release_permit.holder()
 
     @property
     def is_driving(self) -> bool:
@@ -188,7 +187,7 @@ class Lineup:
     @property
     def is_held_ahead(self) -> bool:
         """Whether a held task keeps all others from starting."""
-        return any(task.state is S.HELD for task in self.begun)
+        return self.registry.counts[self.vehicle][S.HELD] > 0
 
     # values of the vehicle that hold for all its tasks
 
@@ -299,12 +298,6 @@ class Lineup:
             and not same_frame(task.progress.frame, seen.frame)
         )
 
-    @property
-    def awaits_commit(self) -> bool:
-        """Whether there is a next task whose submission is not durable yet."""
-        first = None if self.executor.task_id is not None else self.next_id
-        return first is not None and not self.registry.is_durable(first)
-
     def blocker_of(self, task_id: TaskId) -> TaskReason:
         """Return what blocks the next, an active or a released task; NONE for others."""
         if self.released is not None and self.released.task_id == task_id:
@@ -312,10 +305,6 @@ class Lineup:
         if self.executor.task_id == task_id:
             return self.executor.waits_for[0]
         return self._blocked[1] if self._blocked[0] == task_id else R.NONE
-
-    def words_of_blocker(self, task_id: TaskId) -> str:
-        """Return the vehicle's own words for what blocks an active task, or ""."""
-        return self.executor.waits_for[1] if self.executor.task_id == task_id else ""
 
     @property
     def next_id(self) -> TaskId | None:

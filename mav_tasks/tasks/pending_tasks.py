@@ -34,7 +34,7 @@ from mav_tasks.tasks.repetition import (
     next_run,
     why_series_ends,
 )
-from mav_tasks.tasks.task import Draft, QueuePlace, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.times import Times
 
 R, S = TaskReason, TaskState
@@ -85,7 +85,7 @@ class PendingTasks:
 
     def count(self, vehicle: int) -> int:
         """Return how many tasks of a vehicle wait, ready or not."""
-        return self._registry.count_waiting(vehicle)
+        return sum(self._registry.counts[vehicle][: S.STARTING])
 
     def count_of(self, submitter: Submitter) -> int:
         """Return how many tasks of a submitter's owner wait."""
@@ -122,7 +122,7 @@ class PendingTasks:
     def submit(self, draft: Draft, *, now: float) -> Task:
         """Add a new task. Raise Rejection at a limit, or if its dependency cannot complete."""
         queueing = self._settings.queueing
-        if self._registry.count_waiting(draft.vehicle) >= queueing.capacity:
+        if sum(self._registry.counts[draft.vehicle][: S.STARTING]) >= queueing.capacity:
             raise Rejection(R.QUEUE_FULL, f"queue full: {queueing.capacity} tasks wait")
         if self._of_owner[draft.submitter.owner] >= queueing.quota:
             raise Rejection(R.QUOTA, f"quota: this client has {queueing.quota} waiting tasks")
@@ -507,8 +507,9 @@ class PendingTasks:
 
     def _own_rank(self, task: Task, came_at: float) -> Rank:
         """Return a task's own rank, if it has competed with others since ``came_at``."""
-        place = task.terms.place or QueuePlace(task.terms.priority, came_at, task.id)
-        aging = self._settings.queueing.aging
+        place, aging = task.terms.place, self._settings.queueing.aging
+        if place is None:
+            return rank_of(task.terms.priority, came_at=came_at, task_id=task.id, aging=aging)
         return rank_of(place.priority, came_at=place.at, task_id=place.task_id, aging=aging)
 
     def _rerank(self, task: Task, *, came_at: float) -> None:

@@ -31,10 +31,11 @@ class Permit(Generic[T]):
         """End the permit, because something else was requested since."""
         self._holder = None
 
-    def holder(self, *, now: float, halts: int = 0) -> T | None:
+    def holder(self, *, now: float = inf, halts: int = 0) -> T | None:
         """Return the holder, or None if the permit has ended.
 
-        ``halts``: return the holder of a permit that was given exactly so many halts ago.
+        ``now`` may be left out for a permit that no time ends. ``halts``: return the holder of a
+        permit that was given exactly so many halts ago.
         """
-        is_of_now = self._term + halts == self._halts.term and now < self._until
-        return self._holder if is_of_now else None
+        is_in_time = now < self._until or self._until == inf
+        return self._holder if is_in_time and self._term + halts == self._halts.term else None

@@ -97,7 +97,8 @@ class TaskQueue:
 
     def put(self, entry: Entry) -> None:
         """Insert a task, or move it to its new place."""
-        self.discard(entry.task_id)
+        if entry.task_id in self._entries:
+            self.discard(entry.task_id)
         self._entries[entry.task_id] = entry
         for ordered, item in self._places(entry):
             if ordered and item < ordered[-1]:

@@ -44,17 +44,14 @@ class TaskIds:
     """Ids begin at 1 again after MAX_TASK_ID; the earlier tasks with these ids are long over."""
 
     def __init__(self, next_id: int = 1) -> None:
-        self._next = next_id
+        #: the id that the next task gets if it is free
+        self.next = next_id
         self._left = 0  # of the present range
         self._ranges: deque[tuple[int, int]] = deque()
         self._is_shared = False
 
     def __repr__(self) -> str:
-        return f"TaskIds({self._next}, {self._ranges if self._is_shared else 'all'})"
-
-    def count_from(self, next_id: int) -> None:
-        """Continue with this id."""
-        self._next = next_id
+        return f"TaskIds({self.next}, {self._ranges if self._is_shared else 'all'})"
 
     def share(self) -> None:
         """Use granted ids only: other gateways give ids, too."""
@@ -66,30 +63,18 @@ class TaskIds:
 
     def take(self, used: Container[int]) -> TaskId:
         """Return the next id that is not in use; raise Rejection if none is granted."""
-        if not self._is_shared:
-            self._next = self._free(self._next, used)
-            return self._step()
         while True:
-            if not self._left:
-                if not self._ranges:
-                    words = "the database has not granted a task id yet: not accepted"
-                    raise Rejection(TaskReason.STORE_UNAVAILABLE, words)
-                self._next, self._left = self._ranges.popleft()
-            self._left -= 1
-            task_id = self._step()
+            if self._is_shared:
+                if not self._left:
+                    if not self._ranges:
+                        words = "the database has not granted a task id yet: not accepted"
+                        raise Rejection(TaskReason.STORE_UNAVAILABLE, words)
+                    self.next, self._left = self._ranges.popleft()
+                self._left -= 1
+            task_id = TaskId(self.next)
+            self.next = following(task_id)
             if task_id not in used:
                 return task_id
-
-    def _step(self) -> TaskId:
-        task_id = TaskId(self._next)
-        self._next = following(task_id)
-        return task_id
-
-    @staticmethod
-    def _free(task_id: int, used: Container[int]) -> int:
-        while task_id in used:
-            task_id = following(task_id)
-        return task_id
 
 
 class TaskRegistry:
@@ -106,8 +91,8 @@ class TaskRegistry:
         self.runs: dict[int, TaskId] = {}
         #: runs that are over, and whose series has not been continued or ended yet
         self.unplanned: dict[TaskId, None] = {}
-        #: by vehicle, then by state
-        self._counts: dict[int, list[int]] = defaultdict(lambda: [0] * STATES)
+        #: how many tasks there are, by vehicle, then by TaskState; read-only
+        self.counts: dict[int, list[int]] = defaultdict(lambda: [0] * STATES)
         #: return a task, or None if the id is unknown or forgotten
         self.get: Callable[[int], Task | None] = cast("dict[int, Task]", self._tasks).get
         self._last_of: dict[int, int] = {}  # the number of each vehicle's last event
@@ -130,14 +115,6 @@ class TaskRegistry:
         """Return every task that is kept, oldest first."""
         return tuple(self._tasks.values())
 
-    def counts(self, vehicle: int) -> list[int]:
-        """Return how many tasks of a vehicle are in each state; the index is the TaskState."""
-        return list(self._counts[vehicle])
-
-    def count_waiting(self, vehicle: int) -> int:
-        """Return how many tasks of a vehicle have not started."""
-        return sum(self._counts[vehicle][: TaskState.STARTING])
-
     def restore(self, tasks: Sequence[Task]) -> None:
         """Load the tasks of an earlier run, all of them durable."""
         self._tasks.update((task.id, task) for task in tasks)
@@ -146,7 +123,7 @@ class TaskRegistry:
         self._finished.extend(task.id for task in over)
         newest: dict[int, Task] = {}  # by series
         for task in tasks:
-            self._counts[task.vehicle][task.state] += 1
+            self.counts[task.vehicle][task.state] += 1
             if task.state not in TERMINAL:
                 self._note_live(task)
             if task.terms.series:
@@ -172,7 +149,7 @@ class TaskRegistry:
             choice=draft.choice,
         )
         self._tasks[task.id] = task
-        self._counts[task.vehicle][state] += 1
+        self.counts[task.vehicle][state] += 1
         self._note_live(task)
         self.record(TaskSubmitted(task, now))
         if task.choice and not task.is_made:
@@ -209,7 +186,7 @@ class TaskRegistry:
             changed_at=now,
         )
         self._tasks[task_id] = task
-        counts = self._counts[task.vehicle]
+        counts = self.counts[task.vehicle]
         counts[old.state] -= 1
         counts[new] += 1
         self.record(
@@ -252,8 +229,8 @@ class TaskRegistry:
         task = replace(old, vehicle=vehicle, choice=choice, version=version)
         self._tasks[task_id] = task
         self._note_live(task)
-        self._counts[old.vehicle][old.state] -= 1
-        self._counts[vehicle][task.state] += 1
+        self.counts[old.vehicle][old.state] -= 1
+        self.counts[vehicle][task.state] += 1
         self.record(TaskAssigned(task_id, vehicle, version, old.vehicle, choice, now))
         self._last_of[old.vehicle] = self._last_event[task_id] = self.recorded
         return task
@@ -284,7 +261,7 @@ class TaskRegistry:
     def withdraw(self, task_id: TaskId, *, now: float) -> None:
         """Withdraw a submission that did not become durable in time."""
         task = self._tasks.pop(task_id)
-        self._counts[task.vehicle][task.state] -= 1
+        self.counts[task.vehicle][task.state] -= 1
         self._forget_live(task)
         self._last_event.pop(task_id, None)
         self.record(TaskWithdrawn(task_id, task.vehicle, now))
@@ -335,10 +312,6 @@ class TaskRegistry:
         """Return whether the task's last submission, state change or modification is durable."""
         return self._last_event.get(task_id, 0) <= self.durable
 
-    def is_all_durable(self, vehicle: int) -> bool:
-        """Return whether all events of a vehicle are durable."""
-        return self.last_event_of(vehicle) <= self.durable
-
     def last_event_of(self, vehicle: int) -> int:
         """Return the number of a vehicle's last event, 0 for none in this run."""
         return self._last_of.get(vehicle, 0)
@@ -353,7 +326,7 @@ class TaskRegistry:
             if task.state not in TERMINAL:
                 self._forget_live(task)
         self._finished = deque(each for each in self._finished if each not in gone)
-        self._counts.pop(vehicle, None)
+        self.counts.pop(vehicle, None)
         self._last_of.pop(vehicle, None)
         return set(gone)
 
@@ -367,7 +340,7 @@ class TaskRegistry:
         if len(self._finished) > KEPT_FINISHED:
             oldest = self._finished.popleft()
             task = self._tasks.pop(oldest)
-            self._counts[task.vehicle][task.state] -= 1
+            self.counts[task.vehicle][task.state] -= 1
             self._last_event.pop(oldest, None)
 
     def _note_live(self, task: Task) -> None:

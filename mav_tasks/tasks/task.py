@@ -283,8 +283,3 @@ class Task:
     def is_made(self) -> bool:
         """Whether the server made it, as a later run of a series."""
         return self.terms.series not in (0, self.id)
-
-    @property
-    def submitted_to(self) -> int:
-        """The vehicle that its submitter named, or ANY."""
-        return ANY if self.choice else self.vehicle

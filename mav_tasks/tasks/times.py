@@ -8,6 +8,7 @@ from mav_tasks.tasks.task import Task, TaskId, Terms
 
 DAY, HOUR, MINUTE = 86_400.0, 3_600.0, 60.0  # s
 SPARE = 64  # outdated entries of the heap that do not matter
+UNTIMED = (None, None, None, None)
 LATE = 1.0  # s that a clock may have been set back by
 
 
@@ -29,19 +30,14 @@ class Times:
 
     def __init__(self) -> None:
         self._due: dict[TaskId, float] = {}
-        self._heap: list[tuple[float, TaskId]] = []  # with outdated entries
+        self._heap: list[tuple[float, TaskId]] = []  # with outdated entries, but not at its top
+        #: when the first entry is due; inf without one
+        self.next_at = inf
         #: UTC minus monotonic time, s; after a change ``note`` all waiting tasks again
         self.wall_offset = 0.0
 
     def __repr__(self) -> str:
         return f"Times({len(self._due)} due)"
-
-    @property
-    def next_at(self) -> float:
-        """When the first entry is due; inf without one."""
-        while self._heap and self._due.get(self._heap[0][1]) != self._heap[0][0]:
-            heappop(self._heap)
-        return self._heap[0][0] if self._heap else inf
 
     def start(self, terms: Terms) -> float:
         """Return the monotonic time before which a task does not start; -inf without one."""
@@ -62,19 +58,24 @@ class Times:
 
     def note(self, task: Task) -> None:
         """Take a waiting task's start time and deadline, in place of earlier ones."""
-        start, deadline = self.start(task.terms), self.deadline(task.terms)
-        self._put(task.id, deadline if start == -inf else min(start, deadline))
+        terms = task.terms
+        if (terms.start_at, terms.start_utc, terms.start_within, terms.deadline) != UNTIMED:
+            start, deadline = self.start(terms), self.deadline(terms)
+            self._put(task.id, deadline if start == -inf else min(start, deadline))
+        elif task.id in self._due:
+            self.forget(task.id)
 
     def forget(self, task_id: TaskId) -> None:
         """Forget the times of a task that does not wait any more."""
-        self._due.pop(task_id, None)
+        if self._due.pop(task_id, None) == self.next_at:
+            self._look()
 
     def take(self, *, now: float) -> list[TaskId]:
         """Return the tasks whose start or deadline has come, and remove that time."""
         due: list[TaskId] = []
         while self.next_at <= now:
-            due.append(heappop(self._heap)[1])
-            del self._due[due[-1]]
+            due.append(self._heap[0][1])
+            self.forget(due[-1])
         return due
 
     def started(self, task: Task) -> None:
@@ -83,10 +84,18 @@ class Times:
 
     def _put(self, task_id: TaskId, at: float) -> None:
         if at == inf:
-            self._due.pop(task_id, None)
+            self.forget(task_id)
             return
         self._due[task_id] = at
         heappush(self._heap, (at, task_id))
         if len(self._heap) > 2 * len(self._due) + SPARE:
             self._heap = [(at, task_id) for task_id, at in self._due.items()]
             heapify(self._heap)
+        self._look()
+
+    def _look(self) -> None:
+        """Drop outdated entries, and note when the first one is due."""
+        heap = self._heap
+        while heap and self._due.get(heap[0][1]) != heap[0][0]:
+            heappop(heap)
+        self.next_at = heap[0][0] if heap else inf

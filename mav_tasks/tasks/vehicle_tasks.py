@@ -376,8 +376,8 @@ class VehicleTasks(Lineup):
             self.suspended_ids.pop(task.id, None)
             self.executor.adopt(task)
         self.of_earlier_run.discard(task.id)
-        until, term = now + self.settings.watch.ready_timeout, self.halts.term
-        self.last_released = Released(task.id, again, may_continue, actor, until, R.NONE, term)
+        until = now + self.settings.watch.ready_timeout
+        self.release_permit.give(Released(task.id, again, may_continue, actor, until, R.NONE))
         self._look_at_released(seen, now=now)
 
     def _look_at_released(self, seen: VehicleView, *, now: float) -> None:
@@ -386,7 +386,7 @@ class VehicleTasks(Lineup):
         if release is None:
             return
         if task is None or task.id != release.task_id or task.state is not S.HELD:
-            self.last_released = None
+            self.release_permit.end()
             return
         waits_for = self._waits_for(task, seen, may_continue=release.may_continue, now=now)
         why_not = ""
@@ -398,15 +398,15 @@ class VehicleTasks(Lineup):
         elif now >= release.until and waits_for is not R.QUEUE_PAUSED:
             why_not = f"waited too long ({words_of(waits_for)})"
         if why_not:
-            self.last_released = None
+            self.release_permit.end()
             words = f"holds task {task.id} again: {why_not}. Release it again"
             self.registry.note(self.vehicle, words, now=now)
         elif not waits_for:
-            self.last_released = None
+            self.release_permit.end()
             self.executor.release(task, again=release.again, actor=release.actor, now=now)
             self._begun_at = now
         elif waits_for is not release.waits_for:
-            self.last_released = release._replace(waits_for=waits_for)
+            self.release_permit.give(release._replace(waits_for=waits_for))
             self._tell_wait(task.id, waits_for, now=now)
 
     def _waits_for(

@@ -178,7 +178,7 @@ class MessageRequests:
             case m.TaskQueueStatus.id:
                 status = translate.queue_status(
                     tasks,
-                    registry.counts(tasks.vehicle),
+                    registry.counts[tasks.vehicle],
                     heard_at=heard_at,
                     gateway=self._gateway.encode(),
                     version=registry.recorded,

@@ -45,7 +45,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
         return ""
     halts, sender, packet, said = asked.vehicle.tasks.halts, asked.sender, asked.packet, asked.said
     is_old = asked.client.is_late
-    halts.was_asked_to_go_on()
+    halts.was_asked = True
     number = sender.line.number_of(packet.seq)
     sent_after = sender.line.sent_after(number, now=asked.arrived)
     named = _epoch_in(asked.command)

@@ -28,7 +28,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, SubmissionDeduplicator
-from mav_tasks.tasks.forecast import Forecast
+from mav_tasks.tasks.forecast import known_when_empty
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
@@ -236,8 +236,8 @@ class Submissions:
         if runs_now:
             rights.require(OPERATOR, "run a task immediately")
         waiting = vehicle.tasks.count_of(draft.submitter)
-        foreseen = Forecast(vehicle.tasks, self._registry, now=now)
-        draft = rights.checked(draft, waiting=waiting, known=foreseen.known_when_empty)
+        known = partial(known_when_empty, vehicle.tasks, self._registry, now=now)
+        draft = rights.checked(draft, waiting=waiting, known=known)
         if ends_driving_of is not None:
             vehicle.joint.end_driving_of(ends_driving_of, now=now)
         if why_not:
@@ -317,7 +317,8 @@ class Submissions:
             held = "a task" if tasks.held is None else f"task {tasks.held.id}"
             words = f"Task {task.id} waits, press a Held button: {held} is held. {goal}"
         else:
-            ahead = "" if tasks.active is None else f" behind task {tasks.active.id}"
+            active = tasks.executor.task_id
+            ahead = "" if active is None else f" behind task {active}"
             words = f"Task {task.id} queued{ahead}: {goal}{chosen_words(task)}"
             is_blocked = False
         for client in self._gcs.clients:

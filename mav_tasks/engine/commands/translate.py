@@ -12,8 +12,7 @@ from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.driving.estimate import time_left
-from mav_tasks.tasks.driving.guidance import Leg
-from mav_tasks.tasks.driving.legs import first_leg, leg_count, leg_of, length_of
+from mav_tasks.tasks.driving.legs import leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.events import (
@@ -28,7 +27,7 @@ from mav_tasks.tasks.events import (
     VehicleSeen,
 )
 from mav_tasks.tasks.forecast import Forecast, estimate, known_of, position, wait_reason
-from mav_tasks.tasks.goal import Goal, GoTo, Move, Plan, Rotate, describe
+from mav_tasks.tasks.goal import Face, Goal, GoTo, Move, MoveTurned, Plan, Rotate, describe
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.timing import Timing
@@ -132,6 +131,7 @@ def task_status(
     ahead = position(tasks, task) if forecast is not None else None
     to_start, to_finish = map(_float32, estimate(tasks, task, forecast=forecast, now=now))
     progress, submitter = task.progress, task.submitter
+    says = tasks.executor.waits_for[1] if tasks.executor.task_id == task.id else ""
     unit, left = _left(task, tasks)
     step, step_count = _steps(task.goal, progress)
     return m.TaskStatus(
@@ -158,7 +158,7 @@ def task_status(
         submitter_system=submitter.system_id,
         submitter_component=submitter.component_id,
         submitter_link=link_number,
-        text=_cut(_words(task, reason, tasks.words_of_blocker(task.id)), TEXT),
+        text=_cut(_words(task, reason, says), TEXT),
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
         label=task.terms.label.encode(),
         series=task.terms.series,
@@ -311,34 +311,25 @@ def _whole(value: float) -> int:
     return int(value) if isfinite(value) and value == int(value) and value >= 0 else -1
 
 
-def _leg(task: Task) -> Leg | None:
-    """Return the present leg; before the start the first one, or None if it is not known yet."""
-    goal = present_goal(task.goal, task.progress)
-    return first_leg(goal) if task.progress.anchor is None else leg_of(goal, task.progress)
-
-
 def _left(task: Task, tasks: VehicleTasks) -> tuple[int, float]:
     """Return how much is left, and its TASK_UNIT: the way to a place or of a plan, else the leg."""
     if isinstance(task.goal, GoTo | Plan) and task.progress.anchor and task.state not in TERMINAL:
         way = time_left(task.goal, task.progress, known_of(tasks)).metres
         if way > 0.0:
             return UNIT_METRES, _float32(way)
-    leg = _leg(task)
-    unit, length = _size_of(leg)
-    return unit, nan if leg is None else max(0.0, length - task.progress.done)
-
-
-def _size_of(leg: Leg | None) -> tuple[int, float]:
-    """Return the TASK_UNIT of a leg, and its whole length in that unit."""
-    match leg:
-        case None:
-            return UNIT_NONE, 0.0
-        case Move() | Follow():
-            return UNIT_METRES, length_of(leg)
-        case Rotate():
-            return UNIT_RADIANS, length_of(leg)
-        case _:
-            return UNIT_SECONDS, length_of(leg)
+    goal = present_goal(task.goal, task.progress)
+    if task.progress.anchor is not None:
+        leg = leg_of(goal, task.progress)
+    elif isinstance(goal, GoTo | MoveTurned | Face):
+        return UNIT_NONE, nan  # the size of its first leg is not known before it starts
+    else:
+        leg = goal
+    unit = UNIT_SECONDS
+    if isinstance(leg, Move | Follow):
+        unit = UNIT_METRES
+    elif isinstance(leg, Rotate):
+        unit = UNIT_RADIANS
+    return unit, max(0.0, length_of(leg) - task.progress.done)
 
 
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:

@@ -111,12 +111,13 @@ class MissionReports:
 
     def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:
         """Record plan commands that the vehicle refused or did not answer; the plan goes on."""
-        for answered in vehicle.requests.take_unperformed():
+        for answered in vehicle.requests.unperformed:
             ack, command = answered.ack, answered.command
             words = f"did not answer command {command} of the plan"
             if ack is not None:
                 words = f"refused command {command} of the plan (result {ack.result})"
             self._parts.registry.record(VehicleNoted(vehicle.system_id, words, now))
+        vehicle.requests.unperformed.clear()
 
     def _tell(self, vehicle: Vehicle, message: m.Message, *, now: float = inf) -> None:
         """Send a report to all clients but those that are to give up waiting for it ``now``."""

@@ -22,7 +22,9 @@ class Armings:
         self._outdated_at = -inf  # requests to arm from before this time do not count
         self._may_show_until = -inf  # s, that such a request shows as armed
         self._was_disarmed = False  # at that time, or since
-        self._is_to_be_disarmed = False  # a client asked for it, and it shows armed still
+        #: a client asked for its disarming, and no heartbeat has shown that yet: until then the
+        #: vehicle counts as disarmed
+        self.is_to_be_disarmed = False
         self._is_armed = self._is_clients = False  # as shown; by a client through us
 
     def __repr__(self) -> str:
@@ -60,25 +62,16 @@ class Armings:
         self._outdated_at, self._was_disarmed = now, not armed
         self._may_show_until = until
 
-    def expect_disarmed(self, *, armed: bool) -> None:
-        """Note a client's disarming: until the vehicle shows it, the vehicle counts as disarmed."""
-        self._is_to_be_disarmed = armed
-
     def shows(self, *, armed: bool, now: float) -> None:
         """Note the armed state in a heartbeat, and who armed it if it is the first to show it."""
         self._is_clients = self.are_by_client(now=now)
         self._is_armed = armed
         self._was_disarmed |= not armed
-        self._is_to_be_disarmed &= armed
+        self.is_to_be_disarmed &= armed
 
     def was_answered(self) -> None:
         """Note an acknowledged disarming; the acknowledgement may belong to an older one."""
         self._was_disarmed = True
-
-    @property
-    def expects_disarmed(self) -> bool:
-        """Whether a client asked for its disarming, and no heartbeat has shown that yet."""
-        return self._is_to_be_disarmed
 
     def are_older(self, *, ours: float, now: float) -> bool:
         """Return whether, if it shows armed, that is by an outdated request."""
@@ -86,11 +79,11 @@ class Armings:
 
     def do_not_count(self, *, ours: float, now: float) -> bool:
         """Return whether a task must ignore that the vehicle shows armed."""
-        return self._is_to_be_disarmed or self._may_be_older(ours, now)
+        return self.is_to_be_disarmed or self._may_be_older(ours, now)
 
     def forget_halts(self) -> None:
         """Forget the halts: any arming from here on counts."""
-        self._may_show_until, self._is_to_be_disarmed = -inf, False
+        self._may_show_until, self.is_to_be_disarmed = -inf, False
 
     def _outdate(self, asked_at: float, *, armed: bool, now: float) -> None:
         if now - asked_at <= LATE:

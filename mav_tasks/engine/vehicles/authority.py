@@ -12,6 +12,7 @@ from mav_tasks.latest import keep_latest
 from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.permit import Permit
 from mav_tasks.tasks.view import ModeKind
 
 STREAM_GAP = 0.5  # s between the setpoints of a stream: OFFBOARD needs at least 2 Hz
@@ -32,7 +33,6 @@ class Before:
 class Driving:
     """A client's permission to drive through us, and what it has done with it."""
 
-    term: int  # in which it was given: a halt ends it
     client: Hashable = None  # that has the grant; only the last one that asked may drive
     mode: int = -1  # that a client last asked for through us
     driver: Hashable = None  # the last one that drove through us
@@ -44,14 +44,13 @@ class Authority:
 
     def __init__(self, persona: Persona, halts: Halts, *, may_arm: bool) -> None:
         self._persona = persona
-        self._halts = halts
         #: by the settings: whether we may arm it once a person allows that again
         self.may_arm_again = may_arm
-        self._last_driving = Driving(-1)
+        self._permit = Permit[Driving](halts)
         self._asked_at = -inf
         self._passed_on: dict[int, float] = {}  # when a client last asked for each mode
         self._mode_is_ours = False
-        self._other_at = -inf  # manual control, or a second controller
+        self.other_at = -inf  #: s, when somebody drove it who is not our client
         self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message's sender
         #: whether we may arm it; withdrawn when somebody disarms it or changes its mode
         self.may_arm = may_arm
@@ -64,9 +63,11 @@ class Authority:
 
     @property
     def _driving(self) -> Driving:
-        if self._last_driving.term != self._halts.term:
-            self.revoke()
-        return self._last_driving
+        driving = self._permit.holder()
+        if driving is None:
+            driving = Driving()
+            self._permit.give(driving)
+        return driving
 
     def withdraw_arming(self) -> None:
         """Stop arming the vehicle, because somebody else controls it."""
@@ -189,7 +190,7 @@ class Authority:
 
         No client's motion messages pass from here on, so no client drives any more.
         """
-        self._last_driving = Driving(self._halts.term)
+        self._permit.end()
 
     def forget(self, client: Hashable) -> bool:
         """Forget a client that is gone. Return whether it had a grant. A successor must ask."""
@@ -207,10 +208,6 @@ class Authority:
         driving = self._driving
         return driving.driver if now - driving.drove_at < within else None
 
-    def note_other(self, *, now: float) -> None:
-        """Note that somebody who is not our client is driving."""
-        self._other_at = now
-
     def since_other(self, *, now: float) -> float:
         """Return the seconds since somebody else, or a client, was driving."""
-        return now - max(self._other_at, self._driving.drove_at)
+        return now - max(self.other_at, self._driving.drove_at)

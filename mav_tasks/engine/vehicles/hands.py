@@ -76,7 +76,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.FORGET_START:
             parts.forget_start()
         case Effect.FORGET_RELEASE:
-            tasks.last_released = None
+            tasks.release_permit.end()
         case Effect.REVOKE:
             parts.authority.revoke()
         case Effect.OUTDATE:
@@ -112,7 +112,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             ours, armed = control.arming_asked_at, parts.monitor.armed
             parts.armings.outdate_ours(ours=ours, armed=armed, now=now)
         case Effect.EXPECT_DISARMED:
-            parts.armings.expect_disarmed(armed=parts.monitor.armed)
+            parts.armings.is_to_be_disarmed = parts.monitor.armed
         case Effect.DISARM:
             control.disarm_now(now=now)
             requests.flush(now=now)
@@ -125,7 +125,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.DISARM_AT_END:
             control.disarm_at_end()
         case Effect.NOTE_OTHERS:
-            parts.authority.note_other(now=now)
+            parts.authority.other_at = now
         case Effect.LEFT:
             tasks.executor.setpoint_left(now=now)
         case Effect.TELL:

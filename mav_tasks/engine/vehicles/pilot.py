@@ -146,7 +146,7 @@ class Pilot:
     def is_late(self, *, now: float) -> bool:
         """Return whether a tick came so late that the vehicle drove on without us."""
         active = self._parts.tasks.active
-        late = self.clock.lateness(now=now) > self._parts.settings.watch.late_tick
+        late = now - self.clock.next_at > self._parts.settings.watch.late_tick
         return late and active is not None and active.state is TaskState.EXECUTING
 
     def _face(self, *, now: float) -> None:

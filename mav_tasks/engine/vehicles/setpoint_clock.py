@@ -39,7 +39,3 @@ class SetpointClock:
     def stop(self) -> None:
         """Cancel the next tick."""
         self.next_at = inf
-
-    def lateness(self, *, now: float) -> float:
-        """Return the seconds by which the planned tick is late; negative if it is not late."""
-        return now - self.next_at

@@ -265,7 +265,7 @@ class Takeovers:
 
     def _disarmed(self, before: Before, *, now: float) -> None:
         parts = self._parts
-        is_expected = parts.control.may_have_disarmed(now=now) or parts.armings.expects_disarmed
+        is_expected = parts.control.may_have_disarmed(now=now) or parts.armings.is_to_be_disarmed
         if not is_expected and not self._shows_restart:
             self._judge(partial(self._disarmed_by_person, before), now=now)
 

@@ -343,11 +343,11 @@ class Vehicle:
 
     def next_deadline(self) -> float:
         """Return when ``handle_deadline`` must be called next, s."""
-        deadline = min(self._clock.next_at, self.requests.next_deadline() or inf)
+        deadline = min(self._clock.next_at, self.requests.next_deadline())
         if not self._was_heard:  # a silent vehicle cannot answer: ask it nothing
             return deadline
         silent_at = self._monitor.heard_at + self.parts.settings.watch.heartbeat_lost + 1e-3
-        return min(deadline, self.requests.intervals.next_deadline(), silent_at)
+        return min(deadline, self.requests.intervals.check_at, silent_at)
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due: the setpoint tick, repeats, rates, silence."""

@@ -57,10 +57,12 @@ class VehicleRequests:
         self._watch = watch
         self._outlet = outlet
         self._sender = CommandSender(source)
-        self._answers: list[Answered] = []
+        #: the answers to clients' commands; who hands them on clears it
+        self.answers: list[Answered] = []
         self._uploader = MissionUploader(target)
         self._performed: set[int] = set()  # command ids that plans have ordered
-        self._unperformed: list[Answered] = []
+        #: the plans' commands refused or not answered; who reports them clears it
+        self.unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         #: what the vehicle is asked for, how it stops by itself, turns and drives
@@ -128,7 +130,7 @@ class VehicleRequests:
         immediate: bool,
         now: float,
     ) -> None:
-        """Forward a client's command; its answer comes from ``take_answers``.
+        """Forward a client's command; its answer comes into ``answers``.
 
         One that might move the vehicle is not sent after a halt.
         """
@@ -246,12 +248,10 @@ class VehicleRequests:
         if not is_same:
             outlet.send(self._message_request(m.AutopilotVersion.id), self._source)
 
-    def next_deadline(self) -> float | None:
-        """Return when a command is to be repeated or given up, or None."""
-        command, upload = self._sender.next_deadline(), self._uploader.next_deadline()
-        if command is None or upload is None:
-            return upload if command is None else command
-        return min(command, upload)
+    def next_deadline(self) -> float:
+        """Return when a command is to be repeated or given up, s; inf without one."""
+        uploader = self._uploader
+        return min(self._sender.next_deadline(), uploader.again_at, uploader.give_up_at)
 
     def handle_deadline(self, *, now: float) -> None:
         """Repeat or give up what is due; ``flush`` sends it."""
@@ -283,28 +283,18 @@ class VehicleRequests:
             self._dispatch(answer, now=now)
         return bool(setpoints)
 
-    def take_unperformed(self) -> list[Answered]:
-        """Return the plans' commands refused or not answered since the last call."""
-        unperformed, self._unperformed = self._unperformed, []
-        return unperformed
-
-    def take_answers(self) -> list[Answered]:
-        """Return the answers to clients' commands since the last call."""
-        answers, self._answers = self._answers, []
-        return answers
-
     def _message_request(self, wanted: int) -> m.CommandLong:
         return m.CommandLong(*self._target, MavCmd.REQUEST_MESSAGE, 0, wanted, 0, 0, 0, 0, 0, 0)
 
     def _dispatch(self, answer: Answered, *, now: float) -> None:
         result = None if answer.ack is None else answer.ack.result
         if answer.origin is not None:
-            self._answers.append(answer)
+            self.answers.append(answer)
         elif is_request_of(answer):
             self.control.answered(answer, now=now)
         elif answer.command in self._performed:
             if result != MavResult.ACCEPTED:
-                self._unperformed.append(answer)
+                self.unperformed.append(answer)
         elif answer.command == MavCmd.REQUEST_MESSAGE:
             self._note_shown(answer)
         elif answer.command == MavCmd.SET_MESSAGE_INTERVAL:

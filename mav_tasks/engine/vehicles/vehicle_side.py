@@ -4,6 +4,7 @@ Any bytes may come in. Only a packet with a good CRC, from a known or newly hear
 changes anything.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from functools import partial
@@ -25,6 +26,7 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import gcs_heartbeat, kind_of
 from mav_tasks.services.orders import DRIVEN, Orders
 from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
+from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -93,7 +95,7 @@ class VehicleSide(VehicleLinks):
         self.touched: dict[int, Vehicle] = {}
         self._due: dict[int, Timer] = {}
         self._awaiting: dict[int, Vehicle] = {}  # those whose next task waits for the store only
-        self._last_words: dict[int, tuple[Outgoing, ...]] = {}
+        self._last_words: dict[int, tuple[Outgoing, ...]] = defaultdict(tuple)
         #: zero and HOLD for every vehicle that is being driven
         self.emergency_stop_packets: tuple[Outgoing, ...] = ()
 
@@ -113,22 +115,23 @@ class VehicleSide(VehicleLinks):
         touched = list(self.touched.values())
         self.touched.clear()
         for vehicle in touched:
-            system_id = vehicle.system_id
-            if vehicle.tasks.awaits_commit:
-                self._awaiting[system_id] = vehicle
-            else:
+            system_id, tasks = vehicle.system_id, vehicle.tasks
+            first = tasks.next_id if tasks.executor.task_id is None else None
+            if first is None or self._registry.is_durable(first):
                 self._awaiting.pop(system_id, None)
-            engaged = vehicle.control.is_engaged
-            self._note_last_words(
-                system_id, vehicle.requests.emergency_stop_packets if engaged else ()
-            )
+            else:
+                self._awaiting[system_id] = vehicle
+            is_idle = vehicle.control.phase is Phase.IDLE
+            words = () if is_idle else vehicle.requests.emergency_stop_packets
+            if words != self._last_words[system_id]:
+                self._note_last_words(system_id, words)
         return touched
 
     def get(self, system_id: int) -> Vehicle | None:
         """Return a vehicle in order to change it."""
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None:
-            self.mark_dirty(vehicle)
+            self.touched[system_id] = vehicle
         return vehicle
 
     def addressed_by(self, system_id: int) -> list[Vehicle]:
@@ -186,9 +189,8 @@ class VehicleSide(VehicleLinks):
         heard_at = self._ours[system_id] if vehicle is None else vehicle.heard_at
         if now - heard_at < max(GONE, self._settings.watch.heartbeat_lost):
             return False
-        return self._registry.is_all_durable(system_id) and self._fleet.may_forget(
-            system_id, halted_before=now - GONE
-        )
+        is_stored = self._registry.last_event_of(system_id) <= self._registry.durable
+        return is_stored and self._fleet.may_forget(system_id, halted_before=now - GONE)
 
     def _drop(self, system_id: int) -> bool:
         """Drop all control of a vehicle. Return whether it was driven."""
@@ -351,9 +353,8 @@ class VehicleSide(VehicleLinks):
 
     def _note_last_words(self, system_id: int, words: tuple[Outgoing, ...]) -> None:
         """Note the packets that stop a vehicle if the engine fails."""
-        if words != self._last_words.get(system_id, ()):
-            self._last_words[system_id] = words
-            self.emergency_stop_packets = sum(self._last_words.values(), ())
+        self._last_words[system_id] = words
+        self.emergency_stop_packets = sum(self._last_words.values(), ())
 
     def _succeed(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Meet another vehicle at a known address: nothing of the old one's control survives.

@@ -72,11 +72,6 @@ def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
             return goal
 
 
-def first_leg(goal: SingleGoal) -> Leg | None:
-    """Return the first leg of a task that has not started, or None if its size is unknown."""
-    return goal if isinstance(goal, Move | Rotate | Drive | Wait | Head) else None
-
-
 def length_of(leg: Leg) -> float:
     """Return the whole length of a leg, unsigned: metres, radians or seconds."""
     match leg:
