@@ -5,6 +5,7 @@ Effects that wait for the same are carried out in the order in which they came.
 """
 
 from math import inf
+from operator import itemgetter
 from typing import NamedTuple
 
 from mav_tasks.engine.timers import Effect, Timers, Turn
@@ -29,8 +30,8 @@ class CommitGate:
         self._registry = registry
         self.within = within
         self._held: list[_Held] = []
-        self._halts = 0  # number up to which the halts are kept
-        self._timer = timers.timer(Turn.SUBMISSIONS, self._look)
+        self.halts_kept = 0  #: number of the event up to which the halts are kept
+        self._timer = timers.timer(Turn.SUBMISSIONS, self.look)
 
     def __len__(self) -> int:
         return len(self._held)
@@ -40,36 +41,23 @@ class CommitGate:
 
         ``is_halt``: it is enough that the halts among them are kept.
         """
-        held = _Held(self._registry.recorded, now + self.within, is_halt, accept, give_up)
-        if self._is_kept(held):
+        number, until = self._registry.recorded, now + self.within
+        if number <= self._registry.durable or (is_halt and number <= self.halts_kept):
             accept(now=now)
             return
         if not self._held:
-            self._timer.set(held.until)
-        self._held.append(held)
+            self._timer.set(until)
+        self._held.append(_Held(number, until, is_halt, accept, give_up))
 
-    def committed(self, through: int, *, now: float) -> None:
-        """Carry out all effects that waited for events up to ``through``."""
-        self._registry.durable = through
-        self._look(now=now)
-
-    def halts_kept(self, through: int, *, now: float) -> None:
-        """Carry out all effects that waited for halts up to ``through``."""
-        self._halts = through
-        self._look(now=now)
-
-    def _is_kept(self, held: _Held) -> bool:
-        durable = self._registry.durable
-        return held.number <= durable or (held.is_halt and held.number <= self._halts)
-
-    def _look(self, *, now: float) -> None:
+    def look(self, *, now: float) -> None:
         """Carry out what need not wait any more, and give up what has waited too long."""
-        waiting, self._held = self._held, []
+        waiting, self._held, durable = self._held, [], self._registry.durable
         for held in waiting:
-            if self._is_kept(held):
-                held.accept(now=now)
-            elif held.until <= now:
-                held.give_up(now=now)
+            number, until, is_halt, accept, give_up = held
+            if number <= durable or (is_halt and number <= self.halts_kept):
+                accept(now=now)
+            elif until <= now:
+                give_up(now=now)
             else:
                 self._held.append(held)
-        self._timer.set(min((held.until for held in self._held), default=inf))
+        self._timer.set(min(map(itemgetter(1), self._held), default=inf))

@@ -31,7 +31,7 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
-from mav_tasks.engine.commands.words import kind_of_message
+from mav_tasks.engine.commands.words import kind_of
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import FLEET_LINK, Input, LinkSide, Outgoing, Packets, Peer
 from mav_tasks.engine.missions.mission_reports import MissionReports
@@ -46,11 +46,10 @@ from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
-from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import SubmissionDeduplicator
-from mav_tasks.tasks.events import Event, ServerStopped
+from mav_tasks.tasks.events import Event, ServerStopped, TaskSubmitted
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
@@ -155,15 +154,20 @@ class Engine:
 
     def handle(self, item: Input, *, now: float) -> None:
         """Process one input."""
-        self._begin(now=now)
+        self.signatures.now = now
+        if self._timers.not_before + self._settings.watch.late_tick < now:
+            self._vehicles.check_late(now=now)
         match item:
             case inputs.Packets():
                 self._receive((item,), now=now)
             case inputs.Committed(through=through):
-                self._submissions.committed(through, now=now)
+                self._submissions.store_is_away = False
+                self._registry.durable = through
+                self._submissions.gate.look(now=now)
                 self._vehicles.commit(now=now)
             case inputs.HaltsKept(through=through):
-                self._submissions.gate.halts_kept(through, now=now)
+                self._submissions.gate.halts_kept = through
+                self._submissions.gate.look(now=now)
             case inputs.AtOnce(packets=several):
                 self._receive(several, now=now)
             case inputs.LinkChanged(side=side):
@@ -186,7 +190,8 @@ class Engine:
             case inputs.Congestion():
                 self._gcs.note_congestion(item, now=now)
             case inputs.StoreFailed():
-                if self._submissions.store_failed():
+                if not self._submissions.store_is_away:
+                    self._submissions.store_is_away = True
                     self._publisher.warn_of_store(now=now)
             case inputs.HaltNotStored():
                 pass  # for the metrics; the answer to the halt has said so
@@ -233,7 +238,9 @@ class Engine:
 
     def handle_deadline(self, *, now: float) -> None:
         """Do everything due by ``now``; the call may be late, or needless."""
-        self._begin(now=now)
+        self.signatures.now = now
+        if self._timers.not_before + self._settings.watch.late_tick < now:
+            self._vehicles.check_late(now=now)
         due = self._timers.take_due(now=now)
         for timer in due:
             if timer.turn < Turn.SETTLING:
@@ -292,7 +299,7 @@ class Engine:
     def reach(self, *, now: float) -> Reach:
         """Return which vehicles are heard, also those that another gateway has, and are ours."""
         reach = self._vehicles.reach(now=now)
-        is_busy = self._submissions.gate or self._questions
+        is_busy = self._submissions.gate or self._questions.held
         return reach._replace(strays=frozenset()) if is_busy else reach
 
     @property
@@ -308,12 +315,6 @@ class Engine:
         """Until when ``emergency_stop_packets`` may leave, s."""
         return self._vehicles.lease.stop_until
 
-    def _begin(self, *, now: float) -> None:
-        """Note the time; after a delay, and before anything else, stop what drove on without us."""
-        self.signatures.now = now
-        if self._timers.not_before + self._settings.watch.late_tick < now:
-            self._vehicles.check_late(now=now)
-
     def _receive(self, items: Sequence[Packets], *, now: float) -> None:
         """Handle packets in the order of their arrival; those that halt a rover come first."""
         received: list[Received] = []
@@ -322,7 +323,11 @@ class Engine:
             if item.link in self._gcs.links:
                 if item.link == FLEET_LINK:
                     item = self._elsewhere.bring_back(item)
-                received += self._received(item, now=now)
+                taken = self._gcs.let_in(item, now=now)
+                for peer, packet, arrived in self._intake.packets(taken, self._gcs.counts, now=now):
+                    each = self._gcs.receive(item.link, peer, packet, arrived=arrived, now=now)
+                    if each is not None:
+                        received.append(each)
             else:
                 others.append(item)
         if len(items) > 1:
@@ -336,14 +341,6 @@ class Engine:
         for item in others:
             if item.link in self._vehicles.links:
                 self._receive_from_vehicles(item, now=now)
-
-    def _received(self, item: Packets, *, now: float) -> list[Received]:
-        taken = self._intake.packets(self._gcs.let_in(item, now=now), self._gcs.counts, now=now)
-        received: list[Received] = []
-        for peer, packet, arrived in taken:
-            if each := self._gcs.receive(item.link, peer, packet, arrived=arrived, now=now):
-                received.append(each)
-        return received
 
     def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
         for peer, packet, _ in self._intake.packets(item, self._vehicles.counts, now=now):
@@ -369,19 +366,27 @@ class Engine:
 
         The order is otherwise kept.
         """
-        kinds = [self._kind_of(each.message) for each in received]
+        kinds = [self._kind_of(each) for each in received]
         if Kind.HALT not in kinds:
             return received
         goes = [kind in (Kind.GO, Kind.MOTION) for kind in kinds]
         return [received[number] for number in sorted(range(len(goes)), key=goes.__getitem__)]
 
-    def _kind_of(self, message: m.Message | None) -> Kind:
+    def _kind_of(self, received: Received) -> Kind:
+        message, command = received.message, received.command
         target = getattr(message, "target_system", 0)
         is_of_all = target in (EVERYBODY, self._vehicles.our_address.system_id)
         vehicle = (
             next(iter(self._vehicles.all), None) if is_of_all else self._vehicles.look_at(target)
         )
-        return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
+        if vehicle is None:
+            return Kind.WISH
+        if command is not None:
+            return kind_of(command, received.row, vehicle.persona)
+        if isinstance(message, m.SetMode):
+            is_hold = message.custom_mode == vehicle.persona.hold_mode
+            return Kind.HALT if is_hold else Kind.GO
+        return Kind.WISH if message is None else received.row.kind
 
     def _forget(self, vehicle: int) -> None:
         """Forget a vehicle, which another gateway, or another vehicle, has the id of from now."""
@@ -392,7 +397,7 @@ class Engine:
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         if not self._refusals.may_pass(received, now=now):
             return
-        if self._elsewhere.takes(received, now=now):
+        if self._elsewhere.is_shared and self._elsewhere.takes(received, now=now):
             return
         if len(received.client.introduced) < len(self._vehicles.by_id):
             self._publisher.welcome(received.client, now=now)
@@ -404,9 +409,10 @@ class Engine:
 
     def _see_to(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
+        if received.command is not None:
+            self._commands.receive(received, received.command, now=now)
+            return
         match message:
-            case m.CommandLong() | m.CommandInt():
-                self._commands.receive(client, packet, command_of(message), now=now)
             case m.CommandCancel():
                 if vehicle := self._vehicles.get(message.target_system):
                     source, command = packet.source, message.command
@@ -431,7 +437,7 @@ class Engine:
                     self._publisher.hear_operator(message, now=now)
                 elif isinstance(message, ParamMessage):
                     self._parameters.receive(client, packet, message, now=now)
-                self._passing.forward(client, packet, message, now=now)
+                self._passing.forward(received, now=now)
 
     def _take_over(self, vehicles: Sequence[int], restored: Restored, *, now: float) -> None:
         """Serve vehicles that this gateway has got, with their tasks and plans.
@@ -448,7 +454,6 @@ class Engine:
             for received in self._elsewhere.stops_for(vehicle, now=now):
                 self._gcs.hear_out(received, now=now)
                 self._see_to(received, now=now)
-            self._elsewhere.obeyed(vehicle)
 
     def _let_go(self, vehicles: Sequence[int], *, now: float) -> None:
         """Forget vehicles that another gateway hears, unless something came between."""
@@ -468,7 +473,8 @@ class Engine:
         """Pass the vehicles' answers to clients, and new events to clients and the journal."""
         room, signatures = self._fleet.room, self.signatures
         if self._parameters.is_changed:
-            self._apply(self._parameters.take_change())
+            self._parameters.is_changed = False
+            self._apply(self._parameters.settings)
         for system_id in room.take_woken() if room.woken else ():
             if woken := self._vehicles.get(system_id):
                 woken.joint.wake(now=now)
@@ -483,12 +489,11 @@ class Engine:
             self._note_stopped(now=now)
         while signatures.refused:
             self._registry.record(signatures.refused.pop(0))
-        times = signatures.take_times()
-        if times is not None:
-            self._registry.record(times)
+        if signatures.keep_at <= now or signatures.is_used_up:
+            self._registry.record(signatures.take_times())
         if self._registry.unplanned:
             room.plan_runs(now=now)
-        if self._expected or room.expected or self._questions:
+        if self._expected or room.expected or self._questions.held:
             expected = room.expected | self._questions.expected
             if expected != self._expected:
                 self._expected = frozenset(expected)
@@ -496,12 +501,16 @@ class Engine:
         if events:
             self._publisher.publish(events, now=now)
             self._reports.publish(events, now=now)
-            self._assignments.publish(events, now=now)
             self._journal += events
+            for event in events:  # the later runs of a series are made by the server
+                if isinstance(event, TaskSubmitted) and event.task.choice:
+                    self._assignments.watch((event.task,), now=now)
         if self._telling.at <= now:
             self._publisher.send_statuses(now=now)
-        self._starting.set(room.times.next_at)
-        self._keeping.set(signatures.keep_at)
+        if (due := room.times.next_at) != self._starting.at:
+            self._starting.set(due)
+        if signatures.keep_at != self._keeping.at:
+            self._keeping.set(signatures.keep_at)
 
     def _apply(self, settings: Settings) -> None:
         self._settings = settings

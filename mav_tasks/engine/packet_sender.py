@@ -58,29 +58,36 @@ class PacketSender:
         self._sequence.forget(system_id)
 
     def send(
-        self, message: Message, source: Address, *, first: bool = False, until: float = inf
+        self,
+        message: Message,
+        source: Address,
+        *,
+        first: bool = False,
+        until: float = inf,
+        is_fenced: bool = True,
+        is_ours: bool = True,
     ) -> None:
-        """Send a message of our own in the name of ``source``; see ``Outgoing`` for the options."""
-        raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
-        self._put(raw, first=first, until=min(until, self._fence.until))
+        """Send a message of our own in the name of ``source``; see ``Outgoing`` for the options.
 
-    def send_unfenced(self, message: Message, source: Address, *, is_ours: bool) -> None:
-        """Send a message that changes nothing at a vehicle, whichever gateway has it.
-
-        ``is_ours``: a vehicle that this gateway has is there.
+        Not ``is_fenced``: it changes nothing at a vehicle, whichever gateway has it. ``is_ours``: a
+        vehicle that this gateway has is there.
         """
         raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
-        self._put(raw, is_ours=is_ours)
+        if self._signatures is not None and self._signatures.may_sign:
+            raw = self._sealed(raw, is_ours=is_ours)
+        until = min(until, self._fence.until) if is_fenced else until
+        outgoing = Outgoing(self.link, self.peer, raw, first, until)
+        self._queue.append(outgoing)
+        if self._sent is not None:
+            self._sent.append(outgoing)
 
     def forward(self, packet: Packet) -> None:
         """Forward a packet; a gap in its source's sequence numbers stays visible."""
-        seq = self._sequence.forwarded(packet.source, packet.seq)
-        self._put(with_seq(packet, seq), until=self._fence.relays_until)
+        self._relay(packet, self._sequence.forwarded(packet.source, packet.seq))
 
     def inject(self, packet: Packet) -> None:
         """Forward a packet under our next number, for a source that is heard in several places."""
-        seq = self._sequence.injected(packet.source)
-        self._put(with_seq(packet, seq), until=self._fence.relays_until)
+        self._relay(packet, self._sequence.injected(packet.source))
 
     def withhold(self, source: Address) -> None:
         """Skip the number of a packet that is not forwarded, so that no gap shows."""
@@ -90,15 +97,17 @@ class PacketSender:
         """Continue our numbering although the packet's source has restarted its own at 0."""
         self._sequence.continued(packet.source, packet.seq)
 
-    def _put(
-        self, raw: bytes, *, first: bool = False, until: float = inf, is_ours: bool = True
-    ) -> None:
+    def _relay(self, packet: Packet, seq: int) -> None:
+        raw = with_seq(packet, seq)
         if self._signatures is not None and self._signatures.may_sign:
-            if self._fence.is_shared and is_ours:
-                raw = self._signatures.sealed_as_holder(self.link, self.peer, raw)
-            else:
-                raw = self._signatures.sealed(self.link, self.peer, raw)
-        outgoing = Outgoing(self.link, self.peer, raw, first, until)
+            raw = self._sealed(raw)
+        outgoing = Outgoing(self.link, self.peer, raw, until=self._fence.relays_until)
         self._queue.append(outgoing)
         if self._sent is not None:
             self._sent.append(outgoing)
+
+    def _sealed(self, raw: bytes, *, is_ours: bool = True) -> bytes:
+        assert self._signatures is not None, "the caller looked"
+        is_held = self._fence.is_shared and is_ours
+        seal = self._signatures.sealed_as_holder if is_held else self._signatures.sealed
+        return seal(self.link, self.peer, raw)

@@ -37,18 +37,23 @@ class NumberLine:
         """Take a packet in; return its number, counted on. It is late if that is below ``last``."""
         silence, self.heard_at = now - self.heard_at, now
         was_at_0, self._is_at_0 = self._is_at_0, seq == 0 and silence >= SILENT
+        by = (seq - self.last + BEHIND & 0xFF) - BEHIND
         if self.last < 0:
-            self._first = seq
-            return self._move_on(seq, 1, now)
-        ahead = (seq - self.last + BEHIND & 0xFF) - BEHIND
-        if ahead > 0:
-            return self._move_on(self.last + ahead, ahead, now)
-        is_second = was_at_0 and 0 < seq <= FIRST
-        if ahead < 0 and (is_second or self._begins_anew(self.last + ahead, now)):
+            self._first, self.last, by = seq, seq - 1, 1
+        elif by <= 0:
+            is_second = was_at_0 and 0 < seq <= FIRST
+            if by == 0 or not (is_second or self._begins_anew(self.last + by, now)):
+                return self.last + by
             self.lives += 1
-            forward = ahead & 0xFF
-            return self._move_on(self.last + forward, forward, now)
-        return self.last + ahead
+            by &= 0xFF
+        number = self.last = self.last + by
+        self._passed[number & 0xFF] = now
+        if by > 1:
+            for each in range(number - min(by, 256) + 1, number):
+                self._passed[each & 0xFF] = now
+        self._came[number & 0xFF], self._ahead_by[number & 0xFF] = number, by
+        self._behind.clear()
+        return number
 
     def number_of(self, seq: int) -> int:
         """Return the number, counted on, of a packet that was taken in."""
@@ -87,16 +92,6 @@ class NumberLine:
         """Whether a packet seemed to be so far ahead that it may as well be far behind."""
         came = self._came[number & 0xFF] == number
         return came and self._ahead_by[number & 0xFF] > JUMP
-
-    def _move_on(self, number: int, by: int, now: float) -> int:
-        self._passed[number & 0xFF] = now
-        if by > 1:
-            for each in range(number - min(by, 256) + 1, number):
-                self._passed[each & 0xFF] = now
-        self._came[number & 0xFF], self._ahead_by[number & 0xFF] = number, by
-        self._behind.clear()
-        self.last = number
-        return number
 
     def _begins_anew(self, number: int, now: float) -> bool:
         """Whether nothing but rising lower numbers has come for a while: it counts from 0 again.

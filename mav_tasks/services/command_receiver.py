@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeGuard
 
 from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Message
+from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
 
 SAME_PACKET = 5.0  # s, the very same packet again: the same answer
 REPEATED = 2.5  # s in which a client repeats what it has no answer to, MAVSDK at 0.5, 1.0 and 1.5
@@ -58,7 +58,3 @@ class Answer(NamedTuple):
     result_param2: int
     source: Address
     result_param1: int = 0  # the ack's field ``progress``
-
-    def ack(self, to: Address) -> CommandAck:
-        first, second = self.result_param1, self.result_param2
-        return CommandAck(self.command, self.result, first, second, *to)

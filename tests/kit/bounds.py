@@ -24,7 +24,7 @@ class Violation(AssertionError):
 
 
 #: where tasks are kept, whose number is bounded
-TASKS = ("_registry", "_fleet", "_deduplicator")
+TASKS = ("_registry", "_fleet", "deduplicator")
 LEAVES = (str, bytes, int, float, bool, type(None))
 CONTAINERS = (list, dict, set, frozenset, deque, tuple)
 

@@ -17,6 +17,7 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.codec import Packer
+from mav_tasks.services.command_receiver import command_of
 
 EVERYBODY = 0  # target_system and target_component
 
@@ -30,7 +31,10 @@ class Broadcasts:
 
     def addressed(self, received: Received) -> list[Received]:
         """Return a copy of a client's packet for each rover; only the packet if none answers it."""
-        if not _is_to_be_answered(received.message):
+        command = received.command
+        if not isinstance(received.message, m.SetMode | MissionMessage) and (
+            command is None or is_task_command(command.command)
+        ):
             return [received]
         ids = sorted([*self._vehicles.by_id, *(tasks.vehicle for tasks in self._vehicles.unheard)])
         return [self._copy(received, system_id) for system_id in ids] or [received]
@@ -43,11 +47,5 @@ class Broadcasts:
             message.target_component = AUTOPILOT
         packet = received.packet
         raw = self._packer.pack(message, packet.source, seq=packet.seq)
-        return received._replace(packet=packet._replace(raw=raw), message=message)
-
-
-def _is_to_be_answered(message: m.Message | None) -> bool:
-    """Whether each rover is to answer a message of this kind."""
-    if isinstance(message, m.CommandLong | m.CommandInt):
-        return not is_task_command(message.command)
-    return isinstance(message, m.SetMode | MissionMessage)
+        command = None if received.command is None else command_of(message)
+        return received._replace(packet=packet._replace(raw=raw), message=message, command=command)

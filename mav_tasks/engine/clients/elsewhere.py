@@ -24,7 +24,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet, split_datagram
-from mav_tasks.services.command_receiver import is_stop
+from mav_tasks.services.command_receiver import command_of, is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
 
 EVERYBODY = 0  # target_system
@@ -105,18 +105,15 @@ class Elsewhere:
             alone = copy(received.message)
             assert is_stop(alone)
             alone.target_system = vehicle
-            found.append(received._replace(message=alone))
-        return found
-
-    def obeyed(self, vehicle: int) -> None:
-        """Forget the STOPs that a vehicle had not answered: it is ours, and stops."""
+            found.append(received._replace(message=alone, command=command_of(alone)))
         for each in self._stops:
-            each.owed.discard(vehicle)
+            each.owed.discard(vehicle)  # it is ours now, and stops
+        return found
 
     def takes(self, received: Received, *, now: float) -> bool:
         """Pass a packet on if it is for others; return whether it is for another one alone."""
         message = received.message
-        if not self.is_shared or message is None:
+        if message is None:
             return False
         if is_stop(message):
             self._note_stop(received, now=now)

@@ -1,6 +1,6 @@
 """One client: an endpoint on a client link, what it was sent and what it requested."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from math import inf
 
 from mav_tasks.engine.clients.rights import NOTHING, SUBMITTER, Rights
@@ -9,6 +9,8 @@ from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.engine.clients.vehicle_view import LONGEST_US, STREAMED, Pace, VehicleView
 from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.timers import Timer
+from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.latest import keep_latest, shorten
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -41,11 +43,6 @@ SHORTEST, LONGEST = 0.05, LONGEST_US / 1e6  # s between reports of one task to o
 NO_STANDING = (0, False)  # of a client that has said nothing yet
 
 
-def changes_of(rate: float) -> float:
-    """Return how many changes a second go with a rate of requests."""
-    return max(rate * CHANGES, min(rate, LEAST_CHANGES))
-
-
 class GcsClient:
     """One endpoint that receives telemetry, and perhaps sends commands."""
 
@@ -54,10 +51,10 @@ class GcsClient:
         outlet: PacketSender,
         *,
         settings: Clients,
-        wake: Callable[[float], None],
+        statuses: Timer,
         now: float,
     ) -> None:
-        """``wake`` is called with the time at which the next TASK_STATUS is due."""
+        """``statuses`` fires when a TASK_STATUS to some client is due."""
         self.outlet = outlet
         link, peer = outlet.link, outlet.peer
         #: link and endpoint, which identify the client
@@ -97,7 +94,9 @@ class GcsClient:
         #: interval and next time of TASK_STATUS of an active task, s, by vehicle
         self.status_streams: dict[int, tuple[float, float]] = {}
         self._statuses_from = 0.0  # s, until when the rate lets no TASK_STATUS leave
-        self._wake = wake
+        self._timer = statuses
+        #: s, when ``due_statuses`` may have something to give; inf: never, as things are
+        self.statuses_due = inf
         self._text_id = 0
         self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by source and text
         #: counts of texts above the rate limit, by source
@@ -147,12 +146,14 @@ class GcsClient:
     def take_rights(self, rights: Rights) -> None:
         """Set what the submitter may do, and the limits of its key or role."""
         self.rights, rate = rights, rights.limits.rate
+        self.is_observer = not rights.reach(SUBMITTER)
         place = rights.role, rights.key, rate
         limits = self._limits_of.get(place)
         if limits is None:
             burst = rate * AT_ONCE
             requests = TokenBucket(rate=rate, burst=burst)
-            limits = requests, TokenBucket(rate=changes_of(rate), burst=burst)
+            changes = max(rate * CHANGES, min(rate, LEAST_CHANGES))
+            limits = requests, TokenBucket(rate=changes, burst=burst)
             keep_latest(self._limits_of, place, limits, most=MAX_LIMITS)
         self.requests, self.changes = limits
 
@@ -170,7 +171,7 @@ class GcsClient:
 
         Nothing of theirs lets a rover go, so that neither their numbers nor their words matter.
         """
-        if not self.rights.reach(SUBMITTER):
+        if self.is_observer:
             self._observers = self._observers or Sender(Memory(OBSERVED))
             return self._observers
         sender = self._senders.get(source)
@@ -181,7 +182,7 @@ class GcsClient:
 
     def heard(self, packet: Packet, *, now: float) -> None:
         source = packet.source
-        if self.rights.reach(SUBMITTER):
+        if not self.is_observer:
             self.sender(source).line.place(packet.seq, now=self.arrived)
         self.is_passing = not self.is_heard
         if now - self.heard_at > BACK_AFTER:
@@ -219,23 +220,24 @@ class GcsClient:
     def note_change(self, task_id: int) -> None:
         """Note that a task's state changed; telling it twice before it is sent counts once."""
         self._changed[task_id] = None
-        shorten(self._changed, MAX_CHANGED)  # a request still shows those tasks
-        self._wake(self._statuses_from)
+        if len(self._changed) > MAX_CHANGED:
+            shorten(self._changed, MAX_CHANGED)  # a request still shows those tasks
+        self._plan_statuses(self._statuses_from)
 
     def stream_statuses(self, vehicle: int, interval: float | None, *, now: float) -> None:
         """Stream a vehicle's active task every ``interval`` seconds; None: not at all."""
         self.status_streams.pop(vehicle, None)
         if interval is not None:
             self.status_streams[vehicle] = min(max(interval, SHORTEST), LONGEST), now
-        self._wake(now)
+        self._plan_statuses(now)
 
-    def statuses_due_at(self) -> float:
-        """Return when ``due_statuses`` has something to give; inf: never, as things are."""
-        first = self._statuses_from if self._changed else inf
-        return min([first, *(next_at for _, next_at in self.status_streams.values())])
+    def _plan_statuses(self, at: float) -> None:
+        self.statuses_due = min(self.statuses_due, at)
+        if at < self._timer.at:
+            self._timer.set(at)
 
-    def due_statuses(self, active: Mapping[int, int], *, now: float) -> list[int]:
-        """Return the tasks to report now; ``active`` are those that streams report, by vehicle."""
+    def due_statuses(self, look_at: Callable[[int], Vehicle | None], *, now: float) -> list[int]:
+        """Return the tasks to report now; ``look_at`` returns a vehicle, for the streams."""
         due: dict[int, None] = {}
         while self._changed and now >= self._statuses_from:
             if not self._statuses.take(now=now):
@@ -244,16 +246,22 @@ class GcsClient:
             task_id = next(iter(self._changed))
             del self._changed[task_id]
             due[task_id] = None
-        for vehicle, (interval, next_at) in self.status_streams.items():
+        self.statuses_due = self._statuses_from if self._changed else inf
+        for system_id, (interval, next_at) in self.status_streams.items():
             if now >= next_at:
-                self.status_streams[vehicle] = interval, max(next_at + interval, now)
-                if vehicle in active:
-                    due[active[vehicle]] = None
+                next_at = max(next_at + interval, now)
+                self.status_streams[system_id] = interval, next_at
+                vehicle = look_at(system_id)
+                running = None if vehicle is None else vehicle.tasks.executor.task_id
+                if running is not None:
+                    due[running] = None
+            self.statuses_due = min(self.statuses_due, next_at)
         return list(due)
 
     def answer(self, answer: Answer, to: Address) -> None:
         """Send a COMMAND_ACK to the address ``to`` at this endpoint."""
-        self.outlet.send(answer.ack(to), answer.source)
+        command, result, param2, source, param1 = answer
+        self.outlet.send(m.CommandAck(command, result, param1, param2, *to), source)
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Forward a vehicle's packet, unless its stream is above this client's rate."""

@@ -8,7 +8,6 @@ packet as a value; the engine acts on it.
 
 from collections.abc import Callable, Collection
 from itertools import repeat
-from math import inf
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -16,6 +15,7 @@ from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
 from mav_tasks.engine.clients.rights import rights_of
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
 from mav_tasks.engine.clients.stop_packets import stops_in
+from mav_tasks.engine.commands.words import row_said
 from mav_tasks.engine.inputs import (
     Congestion,
     LinkChanged,
@@ -26,6 +26,7 @@ from mav_tasks.engine.inputs import (
     Place,
 )
 from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.policy import Row, row_of
 from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -33,7 +34,7 @@ from mav_tasks.mavlink.codec import Decoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.services.command_receiver import is_stop
+from mav_tasks.services.command_receiver import Command, command_of, is_stop
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 
@@ -49,7 +50,9 @@ SIZE = 64  # each so many bytes count as one more datagram, as many packets may 
 class Received(NamedTuple):
     """A packet of a client. ``message`` is None if its id is not in the dialect.
 
-    ``arrived``: when it arrived on this machine, s, as ``Packets`` tells.
+    - ``arrived``: when it arrived on this machine, s, as ``Packets`` tells.
+    - ``command``: the command in it, None if it is another message.
+    - ``row``: its row in the policy table.
     """
 
     client: GcsClient
@@ -57,6 +60,8 @@ class Received(NamedTuple):
     message: m.Message | None
     key: Key
     arrived: float
+    command: Command | None
+    row: Row
 
 
 class GcsSide:
@@ -90,12 +95,8 @@ class GcsSide:
         self.client = self._clients.get
         #: counts of what came in on these links
         self.counts = self._decoder.counts
-        self._statuses = statuses
+        self.statuses = statuses
         self.apply(settings)
-
-    def plan_statuses(self) -> None:
-        """Set the timer to the next TASK_STATUS that is due."""
-        self._statuses.set(min([client.statuses_due_at() for client in self.clients], default=inf))
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
         """Add a link that came up, remove one that went down."""
@@ -183,7 +184,12 @@ class GcsSide:
             client = self._admit(link, peer, packet, message, key=key, now=now)
         if client is None:
             return None
-        received = Received(client, packet, message, key, arrived)
+        if isinstance(message, m.CommandLong | m.CommandInt):
+            command = command_of(message)
+            row = row_said(command)
+        else:
+            command, row = None, row_of(packet.message_id, message)
+        received = Received(client, packet, message, key, arrived, command, row)
         self.hear_out(received, now=now)
         if message is not None:
             client.heard(packet, now=now)
@@ -269,8 +275,8 @@ class GcsSide:
 
     def _new(self, link: str, peer: Peer, *, now: float) -> GcsClient:
         outlet = PacketSender(link, peer, self._queue, self._packer, self._signatures)
-        wake = self._statuses.bring_forward
-        return GcsClient(outlet, settings=self._settings.clients, wake=wake, now=now)
+        settings = self._settings.clients
+        return GcsClient(outlet, settings=settings, statuses=self.statuses, now=now)
 
     def _admit(
         self, link: str, peer: Peer, packet: Packet, message: m.Message, *, key: Key, now: float

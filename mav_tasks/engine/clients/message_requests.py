@@ -160,10 +160,14 @@ class MessageRequests:
         task = self._registry.get(task_id)
         vehicle = None if task is None else self._vehicles.look_at(task.vehicle)
         if task is not None and vehicle is not None:
-            to = task.submitter.system_id, task.submitter.component_id
-            reader = address_of(*to) if client.submitted(task) else EVERYBODY
-            place = vehicle.tasks, vehicle.server_address
-            self._send_one(_Reader(client, reader, *place, now), task, None)
+            submitter, reader = task.submitter, EVERYBODY
+            if client.submitted(task):
+                reader = address_of(submitter.system_id, submitter.component_id)
+            number = self._gcs.link_numbers.get(submitter.link, 0)
+            status = translate.task_status(
+                task, vehicle.tasks, reader=reader, link_number=number, forecast=None, now=now
+            )
+            client.outlet.send(status, vehicle.server_address)
 
     def _task(self, task_id: int) -> Task:
         task = self._registry.get(task_id)
@@ -186,9 +190,9 @@ class MessageRequests:
                 )
                 to.client.outlet.send(status, to.source)
             case m.TaskStatus.id:
-                first = max(0, translate.first_index_of(command))
+                first = max(0, translate.whole_of(command.params[2]))
                 ids = tasks.page(first, PAGE)
-                if translate.is_of_finished(command):
+                if command.params[3] == translate.FINISHED:
                     ids = registry.finished(tasks.vehicle, first, PAGE)
                 self._send(to, [registry[each] for each in ids])
             case _:
@@ -200,14 +204,11 @@ class MessageRequests:
         """Send the TASK_STATUS of tasks, with their queue positions and estimated times."""
         forecast = Forecast(to.tasks, self._registry, now=to.now)
         for task in shown:
-            self._send_one(to, task, forecast)
-
-    def _send_one(self, to: _Reader, task: Task, forecast: Forecast | None) -> None:
-        number = self._gcs.link_numbers.get(task.submitter.link, 0)
-        status = translate.task_status(
-            task, to.tasks, reader=to.address, link_number=number, forecast=forecast, now=to.now
-        )
-        to.client.outlet.send(status, to.source)
+            number = self._gcs.link_numbers.get(task.submitter.link, 0)
+            status = translate.task_status(
+                task, to.tasks, reader=to.address, link_number=number, forecast=forecast, now=to.now
+            )
+            to.client.outlet.send(status, to.source)
 
     def _show_timing(self, asked: CommandRequest, *, now: float) -> None:
         task_id = translate.task_id_of(asked.command)

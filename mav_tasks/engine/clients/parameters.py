@@ -55,8 +55,8 @@ class ParameterServer:
         self._kept = dict(kept)
         #: by name, the latest PARAM_SET that is not durable yet
         self._pending: dict[str, m.ParamSet] = {}
-        self._settings, self._why_not = with_all(settings, self._kept)
-        #: whether settings changed since the last ``take_change``
+        self.settings, self._why_not = with_all(settings, self._kept)
+        #: whether settings changed; the reader clears it
         self.is_changed = False
 
     @property
@@ -71,12 +71,12 @@ class ParameterServer:
 
     def configured(self, settings: Settings) -> Settings:
         """Take reloaded settings, and return them with the parameters applied."""
-        before, self._configured = self._settings, settings
-        self._settings, self._why_not = with_all(settings, self._kept)
+        before, self._configured = self.settings, settings
+        self.settings, self._why_not = with_all(settings, self._kept)
         for name, each in PARAMETERS.items():
-            if each.value(self._settings) != each.value(before):
+            if each.value(self.settings) != each.value(before):
                 self._tell(name)
-        return self._settings
+        return self.settings
 
     def share(self, values: Mapping[str, float]) -> None:
         """Take the parameters that clients have set at all gateways; they are durable.
@@ -90,11 +90,6 @@ class ParameterServer:
         self._kept = kept
         self.configured(self._configured)
         self.is_changed = True
-
-    def take_change(self) -> Settings:
-        """Return the settings in force, and clear ``is_changed``."""
-        self.is_changed = False
-        return self._settings
 
     def receive(
         self, client: GcsClient, packet: Packet, message: ParamMessage, *, now: float
@@ -129,7 +124,7 @@ class ParameterServer:
 
     def _value(self, name: str) -> m.ParamValue:
         """Return the message that tells a parameter's value."""
-        names, value = list(PARAMETERS), PARAMETERS[name].value(self._settings)
+        names, value = list(PARAMETERS), PARAMETERS[name].value(self.settings)
         index = names.index(name)
         return m.ParamValue(name.encode(), value, MavParamType.REAL32, len(names), index)
 
@@ -175,7 +170,7 @@ class ParameterServer:
         def accept(*, now: float) -> None:
             words = ""
             try:
-                changed(self._settings, name, value)
+                changed(self.settings, name, value)
             except SettingError as error:  # the values that it was checked against were not stored
                 words = str(error)
             settle(words, MavParamError.VALUE_OUT_OF_RANGE, now=now)
@@ -206,7 +201,7 @@ class ParameterServer:
 
     def _take(self, name: str, value: float) -> None:
         self._kept[name] = value
-        self._settings, self._why_not = with_all(self._configured, self._kept)
+        self.settings, self._why_not = with_all(self._configured, self._kept)
         self.is_changed = True
         self._tell(name)
 

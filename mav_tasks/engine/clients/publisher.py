@@ -109,11 +109,12 @@ class Publisher:
 
     def publish(self, events: list[Event], *, now: float) -> None:
         """Send events as texts to all clients, and as TASK_STATUS to submitters and followers."""
-        ended = {e.task_id for e in events if isinstance(e, TaskChanged) and e.new in TERMINAL}
-        if ended:
+        if TaskChanged in map(type, events):
+            ended = {e.task_id for e in events if isinstance(e, TaskChanged) and e.new in TERMINAL}
             self._ended |= ended
             tell = partial(self._tell_ends, ended)
-            self._submissions.gate.hold(tell, tell, now=now)
+            if ended:
+                self._submissions.gate.hold(tell, tell, now=now)
         for event in events:
             if isinstance(event, TaskSubmitted):
                 if event.task.is_made:
@@ -165,18 +166,14 @@ class Publisher:
 
     def send_statuses(self, *, now: float) -> None:
         """Send each client the statuses that are due."""
+        due = inf
         for client in self._gcs.clients:
-            if now < client.statuses_due_at():
-                continue
-            active: dict[int, int] = {
-                vehicle.system_id: active_id
-                for vehicle in self._vehicles.all
-                if (active_id := vehicle.tasks.executor.task_id) is not None
-            }
-            for task_id in client.due_statuses(active, now=now):
-                if task_id not in self._ended:
-                    self._displays.push_status(client, task_id, now=now)
-        self._gcs.plan_statuses()
+            if client.statuses_due <= now:
+                for task_id in client.due_statuses(self._vehicles.look_at, now=now):
+                    if task_id not in self._ended:
+                        self._displays.push_status(client, task_id, now=now)
+            due = min(due, client.statuses_due)
+        self._gcs.statuses.set(due)
 
     def _send_heartbeats(self, *, now: float) -> None:
         """Send the task server's heartbeat for each vehicle that is heard, to each client heard.

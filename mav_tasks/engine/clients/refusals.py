@@ -24,20 +24,20 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 from math import inf
 
-from mav_tasks.engine.clients.gcs_client import GcsClient, changes_of
+from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR
 from mav_tasks.engine.commands.translate import result_of
-from mav_tasks.engine.commands.words import row_said
-from mav_tasks.engine.policy import Kind, row_of
+from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
+from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Answer, command_of, is_stop
+from mav_tasks.services.command_receiver import Answer
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -60,9 +60,9 @@ class Refusals:
     def may_pass(self, received: Received, *, now: float) -> bool:
         """Whether a client's packet is processed; the sender of a refused command is told."""
         client, packet, message = received.client, received.packet, received.message
-        if is_stop(message):
+        command, row, rights, source = received.command, received.row, client.rights, packet.source
+        if command is not None and command.command == MavCmd.TASK_STOP:
             return True
-        row, rights, source = row_of(packet.message_id, message), client.rights, packet.source
         vehicle, owner = self._vehicles.look_at(source.system_id), ""
         if vehicle is not None and source.component_id in vehicle.components:
             owner = "taken on the rover's side"
@@ -82,15 +82,13 @@ class Refusals:
             return True
         what, rate = "requests", rights.limits.rate
         is_taken = client.requests.take(now=now)
-        if isinstance(message, m.CommandLong | m.CommandInt):
-            row = row_said(command_of(message))
         if is_taken and row.is_claimed and row.kind in (Kind.WISH, Kind.GO):
             items = message.count if isinstance(message, m.MissionCount) else 0
             is_taken = client.changes.take(tokens=min(1 + items // ITEMS, rate), now=now)
-            what, rate = "changes", changes_of(rate)
+            what, rate = "changes", client.changes.rate
         if not is_taken:
             self.left_out += 1
-            if isinstance(message, m.CommandLong | m.CommandInt):
+            if command is not None and message is not None:
                 refusal = rights.refusal(
                     f"may send {rate:g} {what} per second", TaskReason.RATE_LIMITED
                 )
@@ -101,15 +99,16 @@ class Refusals:
         self, received: Received, message: m.Message, refusal: Rejection, *, now: float
     ) -> None:
         """Record a refusal; answer a command, unless the client's commands are a flood."""
-        client, packet, target = received.client, received.packet, target_of(message)
-        if not isinstance(message, m.CommandLong | m.CommandInt):
+        client, packet, command = received.client, received.packet, received.command
+        target = target_of(message)
+        if command is None:
             self.stream(client, target.system_id, packet, refusal, now=now)
         elif client.may_be_refused(now=now):
             self.stream(client, target.system_id, packet, refusal, now=now)
             if vehicle := self._vehicles.look_at(target.system_id):
                 ours, result = vehicle.server_address, result_of(refusal.reason)
                 source = Address(target.system_id, target.component_id or ours.component_id)
-                answer = Answer(message.command, result, refusal.reason, source)
+                answer = Answer(command.command, result, refusal.reason, source)
                 client.answer(answer, packet.source)
                 client.tell_refusal(refusal.text, ours, now=now)
 

@@ -58,7 +58,7 @@ class Rights(NamedTuple):
 
         ``moves``: it may move a rover, and how fast and how far is not the server's to say.
         """
-        if not self.reach(role):
+        if RANKS[self.role] < RANKS[role]:
             raise self.refusal(f"may not {what}; {role} may")
         if moves and self.is_bound:
             raise self.refusal(f"may not {what}: its limits of speed or way allow only tasks")
@@ -75,9 +75,9 @@ class Rights(NamedTuple):
 
     def check_terms(self, terms: Terms, before: Terms = UNASKED) -> None:
         """Raise Rejection if terms, of a new task or in place of others, are not allowed."""
-        most = self.limits.max_priority
-        if terms.standing > max(most, before.standing):
-            raise self.refusal(f"may use priority {most} at most, not {terms.standing}")
+        most, standing = self.limits.max_priority, terms.standing
+        if standing > most and standing > before.standing:
+            raise self.refusal(f"may use priority {most} at most, not {standing}")
         if terms.is_preemptive > before.is_preemptive:
             self.require(OPERATOR, "make a task pre-emptive")
 
@@ -106,20 +106,23 @@ class Rights(NamedTuple):
         """Raise Rejection if a task is not allowed, whichever rover drives it."""
         self.require(SUBMITTER, "submit tasks")
         self.check_terms(draft.terms)
-        limits, steps = self.limits, steps_of(draft.goal)
-        kinds = () if limits.tasks == NO_LIMIT.tasks else _kinds_of(draft.goal)
+        limits, goal = self.limits, draft.goal
+        kinds = () if limits.tasks == NO_LIMIT.tasks else _kinds_of(goal)
         for kind in kinds:
             if kind not in limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
-        roles = {step.role for step in steps if isinstance(step, Perform)}
-        for role in (OPERATOR, SAFETY) if roles else ():
-            if role in roles:
-                what = "" if role == OPERATOR else f" for {role}"
-                self.require(role, f"send a plan that contains rover commands{what}", moves=True)
+        if isinstance(goal, Plan):
+            roles = {step.role for step in goal.steps if isinstance(step, Perform)}
+            for role in (OPERATOR, SAFETY):
+                if role in roles:
+                    words = "" if role == OPERATOR else f" for {role}"
+                    words = f"send a plan that contains rover commands{words}"
+                    self.require(role, words, moves=True)
         top = limits.max_speed
-        fastest = 0.0 if top >= NO_LIMIT.max_speed else max(map(speed_named_by, steps), default=0.0)
-        if fastest > top * SAME:
-            raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
+        if top < NO_LIMIT.max_speed:
+            fastest = max(map(speed_named_by, steps_of(goal)), default=0.0)
+            if fastest > top * SAME:
+                raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
 
 
 #: rights of a client that has sent nothing yet

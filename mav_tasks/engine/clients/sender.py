@@ -22,6 +22,7 @@ OBSERVED = 16  # packets of observers at one endpoint
 class Said:
     """A command's packet that was taken in; ``answer`` is None until it has been answered."""
 
+    sender: "Sender"
     command: Command
     raw: bytes
     content: Hashable  # of the sender, the same for each copy of the command
@@ -47,21 +48,12 @@ class Memory:
     """The packets of one endpoint, as long as copies may come, but not more than ``most``."""
 
     def __init__(self, most: int = REMEMBERED) -> None:
-        self._most = most
+        self.most = most
         self.packets: OrderedDict[bytes, Said] = OrderedDict()
         self.contents: dict[Hashable, list[Said]] = {}
 
-    def add(self, said: Said) -> None:
-        """Remember a packet, in place of the same one before."""
-        if said.raw in self.packets:
-            self._forget(self.packets.pop(said.raw))
-        self.packets[said.raw] = said
-        self.contents.setdefault(said.content, []).append(said)
-        oldest = said.at - DOUBLED
-        while len(self.packets) > self._most or next(iter(self.packets.values())).at < oldest:
-            self._forget(self.packets.popitem(last=False)[1])
-
-    def _forget(self, said: Said) -> None:
+    def forget(self, said: Said) -> None:
+        """Forget what equals a packet that is no longer remembered."""
         equal = self.contents[said.content]
         equal.remove(said)
         if not equal:
@@ -85,13 +77,18 @@ class Sender:
 
     def take_in(self, command: Command, raw: bytes, *, now: float) -> Said:
         """Remember a command; return the same packet's before if its answer is held still."""
-        known = self._memory.packets.get(raw)
-        if known is not None and known.is_held:
-            return known
+        memory, twin_at = self._memory, -inf
+        packets = memory.packets
+        if known := packets.get(raw):
+            if known.is_held:
+                return known
+            twin_at = known.at
+            memory.forget(packets.pop(raw))
         content = self, command.target, command.command, command.frame, repr(command.params)
-        twin_at = -inf if known is None else known.at
-        said = Said(command, raw, content, now, self.line.lives, twin_at)
-        self._memory.add(said)
+        said = packets[raw] = Said(self, command, raw, content, now, self.line.lives, twin_at)
+        memory.contents.setdefault(content, []).append(said)
+        while len(packets) > memory.most or next(iter(packets.values())).at < now - DOUBLED:
+            memory.forget(packets.popitem(last=False)[1])
         return said
 
     def earlier(self, said: Said, *, within: float = inf, now: float) -> Iterator[Said]:

@@ -117,6 +117,7 @@ class Signatures:
         self.keep_at = inf
         self._signed_until = signed_until  # as the store has it
         self._highest = 0
+        self.is_used_up = False  #: own timestamps must be stored ahead again
         self._from = signed_until  # least own timestamp, until the clock is known
         self._known_until = signed_until  # latest time that an earlier run knew
         self._told: dict[str, float] = {}  # by key, when its wrong clock was reported
@@ -295,6 +296,7 @@ class Signatures:
         sealed = self._signed(link, signer, raw, clock=clock)
         if signer.last <= clock + COUNTED:  # beyond, it is the other end's time, for it alone
             self._highest = max(self._highest, signer.last)
+            self.is_used_up = self._signed_until < self._highest + RESERVE // 2
         return sealed
 
     def sealed_as_holder(self, link: str, peer: Peer, raw: bytes) -> bytes:
@@ -363,13 +365,10 @@ class Signatures:
 
     # timestamps for the store
 
-    def take_times(self) -> SignaturesSeen | None:
-        """Return the timestamps that are due to be stored, or None if it is not time yet."""
-        is_used_up = self._highest > 0 and self._signed_until < self._highest + RESERVE // 2
-        if self.now < self.keep_at and not is_used_up:
-            return None
-        if is_used_up:
-            self._signed_until = self._highest + RESERVE
+    def take_times(self) -> SignaturesSeen:
+        """Return the timestamps to be stored: at ``keep_at``, or if own ones are used up."""
+        if self.is_used_up:
+            self._signed_until, self.is_used_up = self._highest + RESERVE, False
         times = [
             SignatureTime(fingerprint, stream.link_id, *stream.source, timestamp)
             for (fingerprint, stream), timestamp in self._heard.items()

@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 
 from mav_tasks.engine.clients.elsewhere import Elsewhere
-from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands.assignments import Assignments, check_any, driven_by
@@ -31,7 +31,6 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult
-from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, reused
@@ -51,8 +50,8 @@ SUBMITTED = frozenset(GOALS) - frozenset(_OF_ONE_ROVER)
 class AnyRequest(CommandRequest):
     """A submission for any rover, or a question for a task; answered by the server's address."""
 
-    def __init__(self, client: GcsClient, packet: Packet, said: Said, ours: Address) -> None:
-        super().__init__(client, None, packet, said)
+    def __init__(self, received: Received, said: Said, ours: Address) -> None:
+        super().__init__(received.client, None, received.packet, said, received.row)
         component = said.command.target.component_id or ours.component_id
         self._ours = Address(ours.system_id, component)
         #: the system id of the rover once it is known
@@ -114,8 +113,9 @@ class AnyRover:
     def apply(self, settings: Settings) -> None:
         self._driving = settings.driving
 
-    def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
+    def receive(self, received: Received, command: Command, *, now: float) -> None:
         """Execute or refuse a command to the server; others than these get no answer."""
+        client, packet = received.client, received.packet
         is_shown = command.command == MavCmd.REQUEST_MESSAGE and task_id_of(command) > 0
         is_shown = is_shown and message_id_of(command) == m.TaskStatus.id
         if not (is_shown or command.command in SUBMITTED or is_task_command(command.command)):
@@ -128,7 +128,7 @@ class AnyRover:
                 client.answer(known.answer, packet.source)
             return
         said = sender.take_in(command, packet.raw, now=now)
-        asked = AnyRequest(client, packet, said, self._vehicles.our_address)
+        asked = AnyRequest(received, said, self._vehicles.our_address)
         try:
             if is_shown:
                 self._displays.show_task(client, packet, task_id_of(command), now=now)
@@ -158,13 +158,14 @@ class AnyRover:
         asked.rights.require(asked.row.role, f"send {asked.row.name}")
         if client.waited > GIVEN_UP:
             raise Rejection(R.STALE, "delayed by the server: send it again")
-        wish = parse_command(command, packet.raw, self._driving, now=now)
+        wish, terms, marks = parse_command(command, packet.raw, self._driving, now=now)
         client.uses_dialect |= is_task_command(command.command) and command.params[NONCE] != 0.0
-        check_any(wish.goal)
-        draft = Draft(ANY, command.command, wish.goal, asked.submitter, wish.terms, wish.marks)
+        check_any(wish)
+        draft = Draft(ANY, command.command, wish, asked.submitter, terms, marks)
         asked.rights.check_content(draft)
         confirmation = command.confirmation
-        known = self._submissions.known(draft, confirmation=confirmation, origin=None, now=now)
+        deduplicator = self._submissions.deduplicator
+        known = deduplicator.known(draft, confirmation=confirmation, origin=None, now=now)
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
@@ -174,11 +175,12 @@ class AnyRover:
             self._elsewhere.pass_to(gateway, client, packet)
             return
         again, refuse = partial(self._submit, asked), partial(self._submissions.refuse, asked)
-        if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
+        after, questions = draft.terms.after, self._submissions.questions
+        if after and questions.hold(after, again, refuse, now=now):
             return
         self._submissions.check_open()
         try:
-            choice = self._assignments.choose(wish.goal, now=now)
+            choice = self._assignments.choose(wish, now=now)
         except Rejection:
             gateway = self._elsewhere.gateway_for_any(client)
             if not gateway:
@@ -191,7 +193,7 @@ class AnyRover:
         asked.choose(vehicle)
         if has_left_before_halt(asked, anybodys=True):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
-        goal = driven_by(vehicle, wish.goal)
+        goal = driven_by(vehicle, wish)
         draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)
         task = self._submissions.take_in(asked.rights, vehicle, draft, now=now)
         self._submissions.await_commit(asked, task, now=now)

@@ -22,7 +22,6 @@ from mav_tasks.tasks.choice import Candidate, Choice, choose, is_low
 from mav_tasks.tasks.driving.estimate import Estimate
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.driving.path import distance
-from mav_tasks.tasks.events import Event, TaskSubmitted
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.frames import local_place
@@ -77,12 +76,6 @@ class Assignments:
         vehicles = self._vehicles.all
         candidates = [self._candidate(each, goal, driven_by, now=now) for each in vehicles]
         return choose(candidates, least_battery=self._least_battery)
-
-    def publish(self, events: Iterable[Event], *, now: float) -> None:
-        """Look after new tasks; the later runs of a series are made by the server."""
-        tasks = [each.task for each in events if isinstance(each, TaskSubmitted)]
-        if tasks:
-            self.watch(tasks, now=now)
 
     def watch(self, tasks: Iterable[Task], *, now: float) -> None:
         """Let tasks move to other vehicles if their own fail before they begin."""

@@ -7,8 +7,8 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.goals import CHANGE_MODE, marks_of, reposition_flags
-from mav_tasks.engine.commands.words import kind_of, row_said
-from mav_tasks.engine.policy import Kind
+from mav_tasks.engine.commands.words import SET_MODE, kind_of
+from mav_tasks.engine.policy import Kind, Row, row_of_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -26,7 +26,7 @@ class CommandRequest:
     vehicle: Vehicle
 
     def __init__(
-        self, client: GcsClient, vehicle: Vehicle | None, packet: Packet, said: Said
+        self, client: GcsClient, vehicle: Vehicle | None, packet: Packet, said: Said, row: Row
     ) -> None:
         """``vehicle``: None if it is still to be chosen."""
         self.client = client
@@ -38,15 +38,16 @@ class CommandRequest:
         #: when it arrived, s
         self.arrived = client.arrived
         #: the sender's earlier commands and sequence numbers
-        self.sender = client.sender(packet.source)
+        self.sender = said.sender
         #: the parsed message
         self.command = command = said.command
         #: its row in the policy table
-        self.row = row_said(command)
-        self.kind = self.row.kind
+        self.row = row
+        self.kind = row.kind
         if vehicle is not None:
             self.vehicle = vehicle
-            self.kind = kind_of(command, self.row, vehicle.parts.persona)
+            if command.command == SET_MODE:
+                self.kind = kind_of(command, row, vehicle.parts.persona)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.command}, by {self.submitter})"
@@ -105,7 +106,7 @@ class CommandRequest:
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Send the COMMAND_ACK, unless the halt must be kept first."""
         self.said.answer = Answer(self.command.command, result, result_param2, self.answering)
-        if not self.is_held(result):
+        if self.kind is not Kind.HALT or not self.is_held(result):
             self.client.answer(self.said.answer, self.packet.source)
 
     def refuse(
@@ -144,7 +145,7 @@ class MessageRequest(CommandRequest):
         params = (*vehicle.persona.mode_params(mode), 0.0, 0.0, 0.0, 0.0)
         command = Command(target, MavCmd.DO_SET_MODE, params, 0, None, NO_MESSAGE)
         said = client.sender(packet.source).take_in(command, packet.raw, now=now)
-        return cls(client, vehicle, packet, said)
+        return cls(client, vehicle, packet, said, row_of_command(SET_MODE))
 
     @property
     def marks(self) -> Marks:

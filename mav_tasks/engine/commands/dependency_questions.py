@@ -38,36 +38,33 @@ class DependencyQuestions:
 
     def __init__(self, room: PendingTasks, timers: Timers) -> None:
         self._room = room
-        self._held: deque[_Held] = deque()
+        self.held: deque[_Held] = deque()  #: in the order in which they came
         self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up_late)
-
-    def __len__(self) -> int:
-        return len(self._held)
 
     @property
     def expected(self) -> set[int]:
         """The tasks that are asked about."""
-        return {held.after for held in self._held}
+        return {held.after for held in self.held}
 
     def hold(self, after: int, go_on: Effect, refuse: Refuse, *, now: float) -> bool:
         """Hold a submission back if that is necessary; return whether it is held.
 
         Raise Rejection if too many are. ``go_on`` handles it again, or raises Rejection.
         """
-        if not after or not self._room.is_in_question(after):
+        if not self._room.is_in_question(after):
             return False
-        if len(self._held) >= MOST:
+        if len(self.held) >= MOST:
             raise Rejection(R.RATE_LIMITED, f"run after {after}: too many such submissions wait")
-        self._held.append(_Held(after, now + WITHIN, go_on, refuse))
+        self.held.append(_Held(after, now + WITHIN, go_on, refuse))
         self._plan()
         return True
 
     def answered(self, *, now: float) -> None:
         """Handle those whose task is no longer in question."""
-        held, self._held = self._held, deque()
+        held, self.held = self.held, deque()
         for each in held:
             if self._room.is_in_question(each.after):
-                self._held.append(each)
+                self.held.append(each)
                 continue
             try:
                 each.go_on(now=now)
@@ -77,18 +74,18 @@ class DependencyQuestions:
 
     def keys_revoked(self, *, now: float) -> None:
         """Refuse all: the rights of one may have been those of a key that is no longer valid."""
-        held, self._held = self._held, deque()
+        held, self.held = self.held, deque()
         for each in held:
             each.refuse(Rejection(R.STALE, "a key was revoked meanwhile: send it again"), now=now)
         self._plan()
 
     def _give_up_late(self, *, now: float) -> None:
-        while self._held and self._held[0].until <= now:
-            after, _, _, refuse = self._held.popleft()
+        while self.held and self.held[0].until <= now:
+            after, _, _, refuse = self.held.popleft()
             words = f"run after {after}: the fleet's database did not say within {WITHIN:g} s"
             words += " whether that task exists: submit it again"
             refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now)
         self._plan()
 
     def _plan(self) -> None:
-        self._timer.set(self._held[0].until if self._held else inf)
+        self._timer.set(self.held[0].until if self.held else inf)

@@ -10,6 +10,7 @@ from functools import partial
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.any_rover import AnyRover
@@ -24,7 +25,7 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
 from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions, leave_it
-from mav_tasks.engine.commands.task_control import TaskControl, sets_repetition
+from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.commands.words import halts_again
 from mav_tasks.engine.missions.plans import Plans
@@ -33,7 +34,7 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
+from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import COPIED, Answer, Command
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -41,6 +42,8 @@ from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
 
+#: properties by which TASK_MODIFY lets a task repeat, or sends a piece of that
+REPETITION = (TaskProperty.EVERY, TaskProperty.REPEAT)
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
 
 
@@ -56,14 +59,15 @@ class Commands:
     _displays: MessageRequests
     _any: AnyRover
 
-    def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
+    def receive(self, received: Received, command: Command, *, now: float) -> None:
         """Execute or refuse a client's command, and answer it."""
+        client, packet = received.client, received.packet
         if command.command == MavCmd.TASK_STOP:
             self._stop(client, packet, command, now=now)
             return
         system_id = command.target.system_id
         if system_id == self._vehicles.our_address.system_id:  # and no rover
-            self._any.receive(client, packet, command, now=now)
+            self._any.receive(received, command, now=now)
             return
         vehicle = self._vehicles.get(system_id or min(self._vehicles.by_id, default=0))
         if vehicle is None:
@@ -76,7 +80,7 @@ class Commands:
                 client.answer(known.answer, packet.source)
             return
         said = sender.take_in(command, packet.raw, now=now)
-        asked = CommandRequest(client, vehicle, packet, said)
+        asked = CommandRequest(client, vehicle, packet, said, received.row)
         epoch = vehicle.tasks.halts.epoch
         try:
             if asked.kind is Kind.GO:
@@ -87,7 +91,8 @@ class Commands:
                 asked.answer(MavResult.CANCELLED, refusal.reason)
             else:
                 self._submissions.refuse(asked, refusal, now=now)
-        note_halt(asked, before=epoch)
+        if asked.kind is Kind.HALT or vehicle.tasks.halts.epoch != epoch:
+            note_halt(asked, before=epoch)
         if asked.kind is Kind.HALT and asked.said.answer is not None:  # else the rover answers
             self._submissions.answer_halt(client, asked.said, packet.source, now=now)
 
@@ -106,7 +111,9 @@ class Commands:
         address = Address(system_id, MavComponent.ONBOARD_COMPUTER)
         result, reason, words = MavResult.ACCEPTED, int(R.NONE), ""
         if tasks is None:
-            if system_id != EVERYBODY or not _looks_for_servers(command):
+            is_question = command.command == MavCmd.REQUEST_MESSAGE
+            is_for_servers = is_question and message_id_of(command) == m.TaskQueueStatus.id
+            if system_id != EVERYBODY or not is_for_servers:
                 return
             address = self._vehicles.our_address
         elif command.command == MavCmd.REQUEST_MESSAGE:
@@ -181,9 +188,10 @@ class Commands:
                 | MavCmd.TASK_MODIFY
                 | MavCmd.TASK_RELEASE
                 | MavCmd.DO_CHANGE_SPEED
-            ):
+            ) as number:
                 task_id = self._control.act(asked, now=now)
-                if sets_repetition(asked.command):  # a crash must not leave a task that runs once
+                repeats = number == MavCmd.TASK_MODIFY and asked.command.params[1] in REPETITION
+                if repeats:  # a crash must not leave a task that runs once
                     words = f"task {task_id}: not stored in time that it repeats: send it again"
                     self._submissions.answer_once_durable(asked, TaskId(task_id), words, now=now)
                 else:
@@ -321,11 +329,6 @@ class Commands:
         if not vehicle.is_heard(now=now):  # it is paused nevertheless
             raise Rejection(R.VEHICLE_SILENT, f"paused, but rover {vehicle.system_id} is silent")
         return paused
-
-
-def _looks_for_servers(command: Command) -> bool:
-    is_request = command.command == MavCmd.REQUEST_MESSAGE
-    return is_request and message_id_of(command) == m.TaskQueueStatus.id
 
 
 def _is_of_what_nobody_sends(asked: CommandRequest) -> bool:

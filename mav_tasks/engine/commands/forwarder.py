@@ -4,11 +4,12 @@ A packet goes to the link on which its target was seen.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import SAFETY, SUBMITTER
+from mav_tasks.engine.clients.rights import SAFETY
 from mav_tasks.engine.commands.motion_gate import UNARMED, may_pass, passed, why_not_sent
 from mav_tasks.engine.inputs import Peer, Place
-from mav_tasks.engine.policy import Kind, Row, row_of
+from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -32,22 +33,20 @@ class Forwarder:
         self._vehicles = vehicles
         self._writers = file_transfer.Writers()
 
-    def forward(
-        self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
-    ) -> None:
+    def forward(self, received: Received, *, now: float) -> None:
         """Forward a packet to its target vehicles, unless it is for the task server.
 
         Without a ``message`` its id is unknown and its bytes are unverified. Noise may look so; its
         refusal is not logged.
         """
-        row = row_of(packet.message_id, message).passed_on
+        client, packet, message = received.client, received.packet, received.message
+        row = received.row.passed_on
         target = EVERYBODY if message is None else _target(message)
         why_not = self._why_not(client, row, message, now=now)
         if why_not is not None:
             if message is not None and row.kind is not Kind.TELL:
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
             return
-        is_observers = not client.rights.reach(SUBMITTER)
         behind: dict[Place, list[Vehicle]] = {}  # a radio may have several
         for vehicle in self._vehicles.addressed_by(target.system_id):
             if target != vehicle.server_address:
@@ -60,7 +59,7 @@ class Forwarder:
             refusing = [v for v in vehicles if not may_pass(v, client, row, message)]
             too_much = (
                 self._vehicles.why_not_asked(vehicles[0], client.key, packet, message, now=now)
-                if is_observers and message is not None
+                if client.is_observer and message is not None
                 else None
             )
             if too_much is not None:

@@ -9,7 +9,6 @@ from functools import cache
 from hashlib import blake2b
 from math import degrees, inf, isinf, isnan, nan, radians, tau
 from struct import Struct
-from typing import NamedTuple
 
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.errors import Rejection
@@ -54,14 +53,6 @@ INTEGERS = (5, 6)  # x and y of COMMAND_INT
 _MARK = Struct("<BBHh7d")
 
 
-class ParsedCommand(NamedTuple):
-    """The goal, terms and deduplication keys in a command."""
-
-    goal: SingleGoal
-    terms: Terms
-    marks: Marks
-
-
 def parse_command(
     command: Command,
     packet: bytes,
@@ -70,8 +61,10 @@ def parse_command(
     now: float,
     priority: int = DEFAULT_PRIORITY,
     is_cruising: bool = False,
-) -> ParsedCommand:
-    """Return a parsed task command. Raise Rejection that names a bad parameter.
+) -> tuple[SingleGoal, Terms, Marks]:
+    """Return a task command's goal and terms, and the keys by which a repeat is recognised.
+
+    Raise Rejection that names a bad parameter.
 
     ``priority`` and ``is_cruising`` are for standard commands, which cannot name them.
     """
@@ -81,15 +74,17 @@ def parse_command(
     if command.command not in TASK_COMMANDS:
         refuse_infinite(command)
         terms = _terms(priority, is_cruising=is_cruising)
-        return ParsedCommand(goal, terms, marks_of(command, packet))
+        return goal, terms, marks_of(command, packet)
     marks = marks_of(command, packet, nonce=identifier(command, 4, "nonce"))
-    after = identifier(command, 5, "run after")
-    delay = number(command, 6, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
+    after, delay = 0, 0.0
+    if any(command.params[4:6]):
+        after = identifier(command, 5, "run after")
+        delay = number(command, 6, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
     named = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
     start_at = now + delay if delay > 0 else None
     if after or start_at is not None:
-        return ParsedCommand(goal, Terms(priority=named, after=after, start_at=start_at), marks)
-    return ParsedCommand(goal, _terms(named), marks)
+        return goal, Terms(priority=named, after=after, start_at=start_at), marks
+    return goal, _terms(named), marks
 
 
 @cache  # nearly all are equal, and making them takes time
@@ -112,11 +107,9 @@ def marks_of(command: Command, packet: bytes, *, nonce: int = 0) -> Marks:
         params = tuple(nan if isnan(p) else p for p in params)
     frame = -1 if command.frame is None else command.frame
     packed = _MARK.pack(*command.target, command.command, frame, *params)
-    return Marks(nonce, _digest(packed), "" if nonce else _digest(packet))
-
-
-def _digest(data: bytes) -> str:
-    return blake2b(data, digest_size=9).hexdigest()
+    payload = blake2b(packed, digest_size=9).hexdigest()
+    whole_packet = "" if nonce else blake2b(packet, digest_size=9).hexdigest()
+    return Marks(nonce, payload, whole_packet)
 
 
 # numbers
@@ -239,21 +232,19 @@ def _yaw(command: Command, index: int, *, turn: float) -> float | None:
 
 def _speed_or_default(command: Command, index: int, driving: Driving) -> float | None:
     """Return a speed in m/s, None for the default: 0 or NaN."""
-    if _is_unset(command.params[index - 1]):
+    value = command.params[index - 1]
+    if value == 0.0 or isnan(value):
         return None
     return number(command, index, "speed", low=MIN_SPEED, high=driving.max_speed)
 
 
 def _rate_or_default(command: Command, index: int, driving: Driving) -> float | None:
     """Return a turn rate in rad/s, None for the default: 0 or NaN."""
-    if _is_unset(command.params[index - 1]):
+    value = command.params[index - 1]
+    if value == 0.0 or isnan(value):
         return None
     fastest = degrees(driving.max_turn_rate)
     return radians(number(command, index, "rate", low=MIN_RATE, high=fastest))
-
-
-def _is_unset(value: float) -> bool:
-    return value == 0.0 or isnan(value)
 
 
 # goals
@@ -300,7 +291,8 @@ def refuse_infinite(command: Command) -> None:
 
 def _refuse_reserved(command: Command, index: int) -> None:
     """Raise Rejection if a reserved parameter is set: it must not be ignored silently."""
-    if not _is_unset(command.params[index - 1]):
+    value = command.params[index - 1]
+    if value != 0.0 and not isnan(value):
         raise bad(f"param{index} (unused): must be 0 in this version", param=index)
 
 

@@ -58,8 +58,11 @@ class ModeRequests:
             return True
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, CONTINUE_FIRST)
-        if self._is_return(vehicle, mode):
-            self._submissions.run_now(asked, _return_home(asked), now=now)
+        is_return = mode == vehicle.persona.return_mode and vehicle.parts.settings.claim
+        if is_return and vehicle.where.home is not None:
+            home, command = GoTo(None), MavCmd.NAV_RETURN_TO_LAUNCH
+            draft = Draft(vehicle.system_id, command, home, asked.submitter, CRUISING, asked.marks)
+            self._submissions.run_now(asked, draft, now=now)
             self._show(vehicle, mode, now=now)
             return True
         if not self._is_mission(vehicle, mode):
@@ -158,20 +161,9 @@ class ModeRequests:
             if vehicle.system_id in client.introduced:
                 client.outlet.send(heartbeat, source)
 
-    def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
-        """Whether the server drives this mode itself, as a return to a known home."""
-        is_return = mode == vehicle.persona.return_mode and vehicle.where.home is not None
-        return is_return and vehicle.parts.settings.claim
-
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether the server drives this mode itself, as the mission uploaded to it."""
         active = vehicle.tasks.active
         has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).source)
         has_plan = has_plan or (active is not None and isinstance(active.goal, Plan))
         return mode == vehicle.persona.mission_mode and has_plan and vehicle.parts.settings.claim
-
-
-def _return_home(asked: CommandRequest) -> Draft:
-    """Return the draft for the mode RTL."""
-    number, command = asked.vehicle.system_id, MavCmd.NAV_RETURN_TO_LAUNCH
-    return Draft(number, command, GoTo(None), asked.submitter, CRUISING, asked.marks)

@@ -29,7 +29,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, SubmissionDeduplicator
 from mav_tasks.tasks.forecast import known_when_empty
-from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
+from mav_tasks.tasks.goal import GoTo, describe
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
@@ -66,14 +66,14 @@ class Submissions:
     ) -> None:
         self._gcs = gcs
         self._registry = registry
-        self._deduplicator = deduplicator
+        self.deduplicator = deduplicator
         #: holds submissions that run after a task of another gateway's vehicle
         self.questions = questions
         #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         #: by task that is not durable yet: requests to answer, one for each client and command
         self._undecided: dict[TaskId, list[CommandRequest]] = {}
-        self._store_is_away = False
+        self.store_is_away = False  #: until something is committed: no new submissions
         self._is_closing = False
 
     def close(self) -> None:
@@ -83,23 +83,13 @@ class Submissions:
     def apply(self, settings: Settings) -> None:
         self.gate.within = settings.watch.commit
 
-    def committed(self, through: int, *, now: float) -> None:
-        """Carry out what waited for events up to ``through``; accept submissions again."""
-        self._store_is_away = False
-        self.gate.committed(through, now=now)
-
-    def store_failed(self) -> bool:
-        """Refuse new submissions until something was committed; return whether that is new."""
-        was_away, self._store_is_away = self._store_is_away, True
-        return not was_away
-
     def submit(self, asked: CommandRequest, *, now: float) -> None:
         """Submit the task of a command. Raise Rejection if it is refused."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         if client.waited > GIVEN_UP:
             raise Rejection(R.STALE, "delayed by the server: send it again")
         is_ours, settings = command.command in TASK_COMMANDS, vehicle.parts.settings
-        wish = parse_command(
+        wish, terms, marks = parse_command(
             command,
             asked.packet.raw,
             settings.driving,
@@ -110,21 +100,19 @@ class Submissions:
         # A stock client counts TASK_STATUS, which it cannot read, as a lost packet; it fills unused
         # parameters with zeros. A nonce, or NaN for none, shows that the client knows our dialect.
         client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
-        goal, words = driven(wish.goal, vehicle.parts.persona, system_id=vehicle.system_id)
+        goal, words = driven(wish, vehicle.parts.persona, system_id=vehicle.system_id)
         if isinstance(goal, GoTo):
             check_reach(vehicle, goal)
-        draft = Draft(
-            vehicle.system_id, command.command, goal, asked.submitter, wish.terms, wish.marks
-        )
-        runs_now = asked.is_go_to and (
-            settings.guided == "now" or self._is_next_word(asked, now=now)
-        )
+        draft = Draft(vehicle.system_id, command.command, goal, asked.submitter, terms, marks)
+        is_click = not is_ours and asked.is_go_to
+        runs_now = is_click and (settings.guided == "now" or self._is_next_word(asked, now=now))
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
-        again, refuse = partial(self.submit, asked), partial(self.refuse, asked)
-        if self.questions.hold(draft.terms.after, again, refuse, now=now):
-            return
+        if after := draft.terms.after:
+            again, refuse = partial(self.submit, asked), partial(self.refuse, asked)
+            if self.questions.hold(after, again, refuse, now=now):
+                return
         waits = bool(vehicle.tasks.paused)  # then nothing moves before a command to continue
         if has_left_before_halt(asked, anybodys=not waits):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
@@ -214,7 +202,7 @@ class Submissions:
     def submit_plan(self, rights: Rights, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
         """Submit an uploaded plan; the caller acknowledges it. Raise Rejection if it is refused."""
         task = self.take_in(rights, vehicle, draft, now=now)
-        self._deduplicator.remember(task, at=now, now=now)
+        self.deduplicator.remember(task, at=now, now=now)
         return task
 
     def take_in(
@@ -251,59 +239,58 @@ class Submissions:
 
         This copy's ack may be lost, too, so the time for a further copy starts again.
         """
-        known = self._deduplicator.known(draft, confirmation=1, origin=None, now=begun_at)
+        known = self.deduplicator.known(draft, confirmation=1, origin=None, now=begun_at)
         task = None if known is None else self._registry.get(known.task_id)
         if task is None:
             return None
-        self._deduplicator.remember(task, at=now, now=now)
+        self.deduplicator.remember(task, at=now, now=now)
         return task.id
 
     def take_back(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """Undo a submission that was not stored in time."""
-        self._deduplicator.forget(task)
-        self._store_is_away = True
+        self.deduplicator.forget(task)
+        self.store_is_away = True
         current = self._registry.get(task.id)
         if current is not None and current.state in WAITING:
             vehicle.tasks.room.withdraw(current, now=now)
 
     def retract(self, task: Task) -> list[CommandRequest]:
         """Forget a submission that the store has refused; return the requests to answer."""
-        self._deduplicator.forget(task)
+        self.deduplicator.forget(task)
         return self._undecided.pop(task.id, [])
 
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
         """Note that a client halted a vehicle: a return that it requests next is a new task."""
-        self._deduplicator.held(submitter, vehicle.system_id)
+        self.deduplicator.held(submitter, vehicle.system_id)
 
     @property
     def is_open(self) -> bool:
         """Whether new submissions are accepted."""
-        return not (self._is_closing or self._store_is_away)
+        return not (self._is_closing or self.store_is_away)
 
     def check_open(self) -> None:
         """Raise Rejection while new submissions are refused."""
         if self._is_closing:
             raise Rejection(R.RATE_LIMITED, "the server is shutting down")
-        if self._store_is_away:
+        if self.store_is_away:
             raise Rejection(R.STORE_UNAVAILABLE, "the store is unavailable: not accepted")
 
     def await_commit(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         """Acknowledge a new task once it is durable."""
-        self._deduplicator.remember(task, at=now, now=now)
+        self.deduplicator.remember(task, at=now, now=now)
         self._undecided[task.id] = [asked]
         accept = partial(self._accept, asked, task)
         self.gate.hold(accept, partial(self._withdraw, asked, task), now=now)
 
     def _accept(self, asked: CommandRequest, task: Task, *, now: float) -> None:
-        """Acknowledge a durable submission with the task's id, and tell all clients."""
+        """Acknowledge a durable submission with the task's id, and tell all clients.
+
+        It is a warning to a station that must press a button.
+        """
         if task.id not in self._undecided:
             return  # retracted, and answered
         for each in self._undecided.pop(task.id):
             acknowledge(each, task.id)
-        self._tell_queued(asked, task, now=now)
-
-    def _tell_queued(self, asked: CommandRequest, task: Task, *, now: float) -> None:
-        """Tell all clients of a new task; as a warning to a station that must press a button."""
         tasks, source, goal = asked.vehicle.tasks, asked.vehicle.server_address, describe(task.goal)
         paused, is_blocked = tasks.paused, True
         if tasks.immediate == task.id:
@@ -346,16 +333,10 @@ class Submissions:
         """Whether a submission came before; if so, answer it."""
         # only to compare places
         origin = asked.vehicle.where.origin if isinstance(draft.goal, GoTo) else None
-        known = self.known(draft, confirmation=confirmation, origin=origin, now=now)
+        known = self.deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
         if known is not None:
             self.answer_repeat(asked, known, now=now)
         return known is not None
-
-    def known(
-        self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float
-    ) -> Known | None:
-        """Return the task that a submission repeats, or None: see ``SubmissionDeduplicator``."""
-        return self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
 
     def answer_halt(self, client: GcsClient, said: Said, to: Address, *, now: float) -> None:
         """Send the answer to a command that has halted a vehicle once a restart would know that.

@@ -185,11 +185,6 @@ class TaskControl:
         return task
 
 
-def sets_repetition(command: Command) -> bool:
-    """Whether a command lets a task repeat, or sends a piece of that."""
-    return command.command == MavCmd.TASK_MODIFY and command.params[1] in (P.EVERY, P.REPEAT)
-
-
 def _words(task: Task) -> str:
     return task.state.name.lower()
 

@@ -129,10 +129,11 @@ def task_status(
     """
     reason = wait_reason(tasks, task)
     ahead = position(tasks, task) if forecast is not None else None
-    to_start, to_finish = map(_float32, estimate(tasks, task, forecast=forecast, now=now))
+    to_start, to_finish = estimate(tasks, task, forecast=forecast, now=now)
     progress, submitter = task.progress, task.submitter
     says = tasks.executor.waits_for[1] if tasks.executor.task_id == task.id else ""
     unit, left = _left(task, tasks)
+    words = _words(task, reason, says)
     step, step_count = _steps(task.goal, progress)
     return m.TaskStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
@@ -141,8 +142,8 @@ def task_status(
         nonce=task.marks.nonce,
         after_task_id=task.terms.after,
         remaining=left,
-        time_to_start=to_start,
-        time_to_finish=to_finish,
+        time_to_start=to_start if abs(to_start) < FLOAT32_MAX else nan,
+        time_to_finish=to_finish if abs(to_finish) < FLOAT32_MAX else nan,
         execution_time=nan if progress.anchor is None else progress.execution_time,
         command=task.command,
         queue_position=UNKNOWN_POSITION if ahead is None else min(ahead, LAST_POSITION),
@@ -158,7 +159,7 @@ def task_status(
         submitter_system=submitter.system_id,
         submitter_component=submitter.component_id,
         submitter_link=link_number,
-        text=_cut(_words(task, reason, says), TEXT),
+        text=words.encode()[:TEXT].decode(errors="ignore").encode(),  # whole characters
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
         label=task.terms.label.encode(),
         series=task.terms.series,
@@ -282,24 +283,14 @@ def _severity(reason: TaskReason) -> MavSeverity:
 
 def message_id_of(command: Command) -> int:
     """Return the message id in param1 of REQUEST_MESSAGE and similar commands; -1 if invalid."""
-    return _whole(command.params[0])
+    return whole_of(command.params[0])
 
 
 def task_id_of(command: Command) -> int:
     """Return the task id in param2 of REQUEST_MESSAGE for task messages; -1 if invalid."""
     large = large_number(command.params[1])
-    number = _whole(command.params[1]) if large is None else large
+    number = whole_of(command.params[1]) if large is None else large
     return number if large is not None or number <= EXACT else -1
-
-
-def first_index_of(command: Command) -> int:
-    """Return the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 if invalid."""
-    return _whole(command.params[2])
-
-
-def is_of_finished(command: Command) -> bool:
-    """Whether param4 of REQUEST_MESSAGE(TASK_STATUS, 0) asks for finished tasks."""
-    return command.params[3] == FINISHED
 
 
 def _float32(value: float) -> float:
@@ -307,7 +298,8 @@ def _float32(value: float) -> float:
     return value if abs(value) < FLOAT32_MAX else nan
 
 
-def _whole(value: float) -> int:
+def whole_of(value: float) -> int:
+    """Return a parameter that is a number from 0 on; -1 if it is invalid."""
     return int(value) if isfinite(value) and value == int(value) and value >= 0 else -1
 
 
@@ -348,8 +340,3 @@ def _words(task: Task, reason: TaskReason, says: str) -> str:
     if not reason:
         return words
     return f"{words} ({words_of(reason)}: {says})" if says else f"{words} ({words_of(reason)})"
-
-
-def _cut(text: str, size: int) -> bytes:
-    """Return a text in UTF-8, cut to as many whole characters as fit."""
-    return text.encode()[:size].decode(errors="ignore").encode()

@@ -2,17 +2,16 @@
 
 from mav_tasks.engine.commands.goals import has_place
 from mav_tasks.engine.policy import (
+    COMMANDS,
     DISARM,
     PAUSE,
     PAUSE_HERE,
     Kind,
     Row,
     row_of_command,
-    row_of_message,
 )
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetMode
-from mav_tasks.services.command_receiver import REPEATED, Command, command_of
+from mav_tasks.services.command_receiver import REPEATED, Command
 from mav_tasks.services.persona import Persona
 
 #: commands whose parameters decide their row
@@ -32,7 +31,7 @@ def row_said(command: Command) -> Row:
                 return PAUSE
             case MavCmd.DO_REPOSITION, _ if not has_place(command):
                 return PAUSE_HERE
-    return row_of_command(command.command)
+    return COMMANDS.get(command.command) or row_of_command(command.command)
 
 
 def kind_of(command: Command, row: Row, persona: Persona) -> Kind:
@@ -40,16 +39,6 @@ def kind_of(command: Command, row: Row, persona: Persona) -> Kind:
     if command.command != SET_MODE:
         return row.kind
     return Kind.HALT if persona.mode_in(*command.params[1:3]) == persona.hold_mode else Kind.GO
-
-
-def kind_of_message(message: Message | None, persona: Persona) -> Kind:
-    """Return the kind of a client's message, by which a batch of them is ordered."""
-    if isinstance(message, SetMode):
-        return Kind.HALT if message.custom_mode == persona.hold_mode else Kind.GO
-    if isinstance(message, CommandLong | CommandInt):
-        command = command_of(message)
-        return kind_of(command, row_said(command), persona)
-    return Kind.WISH if message is None else row_of_message(message.id).kind
 
 
 def halts_again(command: Command, persona: Persona, *, after: float) -> bool:

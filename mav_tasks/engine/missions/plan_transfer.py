@@ -19,6 +19,7 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.commands.assignments import check_any, driven_by
 from mav_tasks.engine.commands.reach import check_reach
 from mav_tasks.engine.commands.submissions import chosen_words
+from mav_tasks.engine.commands.words import row_said
 from mav_tasks.engine.missions.fence_items import (
     check_fence_item,
     check_rally_item,
@@ -302,7 +303,7 @@ class PlanTransfer(Transfer):
         params = NOWHERE if item is None else item.params
         command = Command(self.address, message.command, params, 0, message.frame, NO_MESSAGE)
         said = client.sender(packet.source).take_in(command, packet.raw, now=now)
-        asked = GuidedItemRequest(client, self._vehicle, packet, said)
+        asked = GuidedItemRequest(client, self._vehicle, packet, said, row_said(command))
         try:
             if message.current == ONLY_HIGHER:
                 asked.answer(MavResult.ACCEPTED)

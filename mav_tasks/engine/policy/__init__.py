@@ -19,6 +19,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.services import file_transfer
 
 __all__ = [
+    "COMMANDS",
     "DISARM",
     "GO_TO",
     "PAUSE",

@@ -154,8 +154,8 @@ class VehicleLinks:
         self._asked.append(self._question.ts1)
         for outlet in outlets.values():
             is_ours = self.has_vehicle_at(outlet.link, outlet.peer)
-            outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=is_ours)
-            outlet.send_unfenced(self._question, self.our_address, is_ours=is_ours)
+            outlet.send(gcs_heartbeat(), self.our_address, is_fenced=False, is_ours=is_ours)
+            outlet.send(self._question, self.our_address, is_fenced=False, is_ours=is_ours)
 
     def _where_sent(self, packet: Packet, place: Place) -> set[Place]:
         """Return where the server has sent this packet lately, which comes from a place now.

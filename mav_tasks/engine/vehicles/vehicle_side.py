@@ -395,7 +395,7 @@ class VehicleSide(VehicleLinks):
         if outlet is None:
             return None
         if is_new:
-            outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=True)
+            outlet.send(gcs_heartbeat(), self.our_address, is_fenced=False)
         vehicle = Vehicle(
             number,
             heartbeat=heartbeat,
