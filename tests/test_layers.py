@@ -277,7 +277,7 @@ SEAMS = (
     *("mav_tasks.tasks.driving", "mav_tasks.tasks.repetition", "mav_tasks.tasks.queue"),
     *("mav_tasks.plan_files", "mav_tasks.qgc_actions", "mav_tasks.fleet", "mav_tasks.config"),
     *("mav_tasks.setting_keys", "mav_tasks.recording", "mav_tasks.mcap_export"),
-    *("mav_tasks.key_ring", "mav_tasks.logs", "mav_tasks.tasks.frames", "mav_tasks.tasks.cron"),
+    *("mav_tasks.key_ring", "mav_tasks.logs", "mav_tasks.tasks.cron"),
 )
 #: public all the same: of named tuples, of the interpreter, of pymavlink's messages
 NOT_PRIVATE = frozenset({"_replace", "_make", "_asdict", "_exit", "_timestamp"})

@@ -12,8 +12,13 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
 
 from generated import keep_current  # noqa: E402
-from mav_tasks.engine.vehicles.control import Event  # noqa: E402
-from mav_tasks.engine.vehicles.joint_state import Grip, Queue, State, Work  # noqa: E402
+from mav_tasks.engine.vehicles.control import (  # noqa: E402
+    Event,
+    Grip,
+    Queue,
+    State,
+    Work,
+)
 from tests.kit.joint.graph import can_happen, variants  # noqa: E402
 from tests.kit.joint.model import MAKES, happens  # noqa: E402
 

@@ -12,7 +12,7 @@ from generated import keep_current
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.policy import commands as of_commands
 from mav_tasks.engine.policy import messages as of_messages
-from mav_tasks.engine.policy.row import UNKNOWN
+from mav_tasks.engine.policy.commands import UNKNOWN
 from mav_tasks.settings import ROLES
 
 KINDS = list(Kind)

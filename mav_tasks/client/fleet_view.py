@@ -11,9 +11,8 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.persona import Persona, persona_of
-from mav_tasks.services.sys_status import charge_of, passes_checks
+from mav_tasks.services.vehicle_status import HeartbeatMonitor, charge_of, passes_checks
 
 SILENT_AFTER = 3.5  # s without a heartbeat; same as in the server
 GAP = 1.7  # s without a heartbeat, after which the server may be another process

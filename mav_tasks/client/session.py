@@ -33,9 +33,9 @@ from mav_tasks.mavlink.codec import Decoder, Encoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavState
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import text_receiver
-from mav_tasks.services.heartbeat import HeartbeatSender, component_heartbeat
-from mav_tasks.services.text_receiver import TextReceiver
+from mav_tasks.services import statustext
+from mav_tasks.services.statustext import TextReceiver
+from mav_tasks.services.vehicle_status import HeartbeatSender, component_heartbeat
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
 
 #: s within which the STATUSTEXT of a refusal follows its ack
@@ -324,7 +324,7 @@ class Session:
         if followed is not None:
             self.on_news(followed)
 
-    def _text(self, text: text_receiver.Text) -> None:
+    def _text(self, text: statustext.Text) -> None:
         vehicle, component = text.sender
         view = self.fleet.get(vehicle)
         is_ours = view is not None and view.server_component in (None, component)

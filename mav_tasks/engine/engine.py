@@ -23,26 +23,23 @@ from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.commands.any_rover import AnyRover
 from mav_tasks.engine.commands.assignments import Assignments
-from mav_tasks.engine.commands.command_request import MessageRequest
-from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
+from mav_tasks.engine.commands.command_request import MessageRequest, kind_of
 from mav_tasks.engine.commands.dispatch import Commands
-from mav_tasks.engine.commands.forwarder import Forwarder
+from mav_tasks.engine.commands.forwarding import Forwarder, deliver
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
-from mav_tasks.engine.commands.words import kind_of
+from mav_tasks.engine.commit_gate import DependencyQuestions
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import FLEET_LINK, Input, LinkSide, Outgoing, Packets, Peer
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionMessage, MissionServers
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.missions.transfer import MissionParts
-from mav_tasks.engine.packet_reader import PacketReader
+from mav_tasks.engine.packets import LeaseWatch, PacketReader
 from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.snapshot import Reach, Snapshot, VehicleSnapshot
 from mav_tasks.engine.timers import Timers, Turn
-from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
@@ -475,7 +472,8 @@ class Engine:
         if self._parameters.is_changed:
             self._parameters.is_changed = False
             self._apply(self._parameters.settings)
-        for system_id in room.take_woken() if room.woken else ():
+        woken_ids, room.woken = room.woken, set()
+        for system_id in woken_ids:
             if woken := self._vehicles.get(system_id):
                 woken.joint.wake(now=now)
         for vehicle in self._vehicles.settle() if self._vehicles.touched else ():

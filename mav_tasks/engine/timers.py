@@ -68,11 +68,6 @@ class Timer:
             timers.not_before = min(timers.not_before, at)
             heappush(timers.heap, (at, self.turn, self.number, self))
 
-    def bring_forward(self, at: float) -> None:
-        """Set the due time unless the timer is due earlier."""
-        if at < self.at:
-            self.set(at)
-
 
 class Timers:
     """The timers of all parts."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from mav_tasks.engine.inputs import Input, LinkChanged, Packets, Peer, PeerChanged
-from mav_tasks.engine.packet_reader import PacketReader
+from mav_tasks.engine.packets import PacketReader
 from mav_tasks.logs.link_observer import LinkObserver
 from mav_tasks.logs.rendering import clean
 from mav_tasks.mavlink.address import AUTOPILOT
@@ -15,7 +15,7 @@ from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Statustext
 from mav_tasks.mavlink.packet import MAGIC_V1, Packet
 from mav_tasks.mavlink.stream import is_whole
-from mav_tasks.services.text_receiver import Text, TextReceiver
+from mav_tasks.services.statustext import Text, TextReceiver
 from mav_tasks.services.token_bucket import TokenBucket
 
 RATE = 10.0  # texts per second of one vehicle; more are only counted

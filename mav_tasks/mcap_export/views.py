@@ -16,7 +16,7 @@ from mav_tasks.mavlink.enums import MavFrame, MavSeverity, PositionTargetTypemas
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.mcap_export import convention, schemas
 from mav_tasks.mcap_export.schemas import Schema
-from mav_tasks.services.text_receiver import Text, TextReceiver
+from mav_tasks.services.statustext import Text, TextReceiver
 
 ATTITUDE_COUNTS = 1_000_000_000  # ns, for which a pose is drawn with the last attitude
 SECOND = 1_000_000_000  # ns

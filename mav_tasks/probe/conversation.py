@@ -11,10 +11,10 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.probe.other_traffic import SETPOINTS, OtherTraffic
 from mav_tasks.probe.steps import Steps, Wait
 from mav_tasks.services.command_sender import CommandSender
-from mav_tasks.services.heartbeat import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
 from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.persona import Persona
-from mav_tasks.services.text_receiver import TextReceiver
+from mav_tasks.services.statustext import TextReceiver
+from mav_tasks.services.vehicle_status import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
 from mav_tasks.settings import Watch
 
 NO_ANSWER = "no answer"

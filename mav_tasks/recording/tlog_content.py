@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Packets, Peer
-from mav_tasks.engine.packet_reader import PacketReader
+from mav_tasks.engine.packets import PacketReader
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import DecodeCounts, crc_fits
 from mav_tasks.mavlink.packet import HEADER_V1, HEADER_V2, MAGIC_V2

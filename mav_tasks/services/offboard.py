@@ -22,11 +22,19 @@ from mav_tasks.mavlink.messages import (
     SetPositionTargetLocalNed,
 )
 from mav_tasks.services.command_sender import Answered, CommandSender
-from mav_tasks.services.insistence import Insistence
 from mav_tasks.services.news import AWAITED, News
-from mav_tasks.services.orders import STANDING, Orders, Posture, Speeds, to_stand
+from mav_tasks.services.orders import (
+    ENDED,
+    STANDING,
+    STREAMING,
+    Orders,
+    Phase,
+    Posture,
+    Speeds,
+    to_stand,
+)
 from mav_tasks.services.persona import Persona
-from mav_tasks.services.phase import ENDED, STREAMING, Phase
+from mav_tasks.services.retry import Insistence
 from mav_tasks.settings import Watch
 
 STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirmed yet
@@ -650,12 +658,9 @@ class OffboardControl:
     def _withdraw(self, command: MavCmd) -> None:
         self._sender.withdraw(self._target.component_id, command)
 
-    @property
-    def _standing(self) -> Speeds:
-        return to_stand(self._persona, self.posture, armed=self._news.armed)
-
     def _send_setpoint(self, wanted: Speeds) -> None:
-        wanted = self._standing if wanted == STANDING else wanted
+        if wanted == STANDING:
+            wanted = to_stand(self._persona, self.posture, armed=self._news.armed)
         self._outgoing.append(self._orders.velocity(wanted))
 
 

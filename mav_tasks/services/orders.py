@@ -1,5 +1,6 @@
 """What is said to one vehicle so that it does what we want, in the way of its persona. Pure."""
 
+from enum import Enum, auto
 from math import copysign, cos, isfinite, nan, sin
 from typing import NamedTuple
 
@@ -8,6 +9,35 @@ from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavType
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetPositionTargetLocalNed
 from mav_tasks.services.mission_item import NOT_GIVEN
 from mav_tasks.services.persona import Persona
+
+
+class Phase(Enum):
+    #: it is not ours; nothing is sent
+    IDLE = auto()
+    #: a heartbeat is awaited that shows whose it is now
+    LOOKING = auto()
+    #: HOLD is asked for, to arm in it
+    ASKING_HOLD = auto()
+    #: arming is asked for, zeros are streamed
+    ASKING_ARM = auto()
+    #: armed in HOLD; zeros are streamed
+    LEADING_IN = auto()
+    #: our mode is asked for
+    ASKING_MODE = auto()
+    #: in our mode and seen armed: setpoints move it
+    CONTROL = auto()
+    #: standing, HOLD is asked for
+    RELEASING = auto()
+    #: HOLD seen after a release that disarms; disarming is asked for
+    DISARMING = auto()
+    #: STOP: zeros and HOLD until confirmed
+    STOPPING = auto()
+
+
+#: nothing of ours is under way that still has to come true
+ENDED = frozenset({Phase.IDLE, Phase.RELEASING, Phase.STOPPING})
+STREAMING = frozenset({Phase.ASKING_ARM, Phase.LEADING_IN, Phase.CONTROL})
+
 
 #: others give the mode numbers other meanings
 DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})

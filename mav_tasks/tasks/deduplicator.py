@@ -11,7 +11,7 @@ from operator import attrgetter
 
 from mav_tasks.errors import Rejection
 from mav_tasks.latest import keep_latest, shorten
-from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.goal import GlobalPlace, GoTo
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry

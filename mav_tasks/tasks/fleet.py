@@ -1,4 +1,9 @@
-"""The tasks of all vehicles, connected or not, and their restoration after a restart."""
+"""The tasks of all vehicles, connected or not, and their restoration after a restart.
+
+Also how far a gateway signs ahead of its clock, which is a fence at the vehicle: all gateways of a
+fleet sign to a vehicle with one link id. A vehicle refuses what is not later than the last packet
+of that, so each gateway that gets it signs ahead of the one before.
+"""
 
 from collections.abc import Iterator
 
@@ -11,6 +16,15 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+
+#: s by which the lead grows with each takeover. The clocks of gateways may differ by that, less the
+#: second from one heartbeat to the next
+STEP = 3.0
+#: s; a vehicle takes no stream that is new to it and a minute behind its time
+MOST_LEAD = 50.0
+#: s a second, by which a lead is reduced again
+DECAY = 0.01
+
 
 R, S = TaskReason, TaskState
 

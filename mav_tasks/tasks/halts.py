@@ -2,12 +2,12 @@
 
 Each halt raises the epoch, whatever its cause: STOP, HOLD, a pause, disarming, a takeover, a loss.
 Equal ones in short order raise it once. ``term`` counts all of them: whatever may move the vehicle
-later holds the term in which it was permitted, and counts in that term only.
+later is a ``Permit``, which remembers the term in which it was given and counts in that term only.
 """
 
 from collections.abc import Hashable
 from math import inf
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from mav_tasks.latest import keep_latest
 from mav_tasks.tasks.events import SERVER
@@ -135,3 +135,35 @@ class Halts:
             self.command = command
         self.by, self.number = sender, max(number, before)
         keep_latest(self._numbers, sender, self.number, most=SENDERS)
+
+
+T = TypeVar("T")
+
+
+class Permit(Generic[T]):
+    """A permit for one vehicle. Its holder is the client that has it, or what is permitted."""
+
+    def __init__(self, halts: Halts) -> None:
+        self._halts = halts
+        self._holder: T | None = None
+        self._term, self._until = -1, -inf
+
+    def __repr__(self) -> str:
+        return f"Permit({self._holder}, until={self._until:.2f})"
+
+    def give(self, holder: T, *, until: float = inf) -> None:
+        """Give the permit to a holder; this replaces the previous holder."""
+        self._holder, self._term, self._until = holder, self._halts.term, until
+
+    def end(self) -> None:
+        """End the permit, because something else was requested since."""
+        self._holder = None
+
+    def holder(self, *, now: float = inf, halts: int = 0) -> T | None:
+        """Return the holder, or None if the permit has ended.
+
+        ``now`` may be left out for a permit that no time ends. ``halts``: return the holder of a
+        permit that was given exactly so many halts ago.
+        """
+        is_in_time = now < self._until or self._until == inf
+        return self._holder if is_in_time and self._term + halts == self._halts.term else None

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import SET_FAILSAFE, Driving, Settings
-from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.limits import safe_braking
+from mav_tasks.tasks.driving.bounds import Bounds, safe_braking
+from mav_tasks.tasks.driving.executor import Executor
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.driving.watches import JumpWatch, LedAway
 from mav_tasks.tasks.events import (
@@ -23,12 +23,10 @@ from mav_tasks.tasks.events import (
     VehicleIdentified,
     VehicleSpeedSet,
 )
-from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import SingleGoal
-from mav_tasks.tasks.halts import DISABLED, Halts
+from mav_tasks.tasks.halts import DISABLED, Halts, Permit
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks
-from mav_tasks.tasks.permit import Permit
 from mav_tasks.tasks.queue import TaskQueue, outranks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Task, TaskId, same_frame

@@ -63,7 +63,7 @@ class PendingTasks:
         self._dependents: dict[int, dict[TaskId, None]] = {}
         #: start times and deadlines
         self.times = Times()
-        #: the vehicles whose tasks became ready or left since ``take_woken``
+        #: the vehicles whose tasks became ready or left; the reader clears it
         self.woken: set[int] = set()
         #: whether tasks that the registry lacks may be another gateway's
         self.is_shared = False
@@ -111,11 +111,6 @@ class PendingTasks:
         if waiter := self._waiters.get(task.id):
             return waiter.rank
         return self._most_urgent(task.id, self._own_rank(task, task.submitted_at))
-
-    def take_woken(self) -> set[int]:
-        """Return the vehicles whose tasks became ready or left since the last call."""
-        woken, self.woken = self.woken, set()
-        return woken
 
     # arrival
 

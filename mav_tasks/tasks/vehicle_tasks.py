@@ -9,6 +9,7 @@ from math import inf
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks import view
+from mav_tasks.tasks.driving.executor import has_moved
 from mav_tasks.tasks.driving.legs import leg_of
 from mav_tasks.tasks.driving.mission_sequencer import (
     goal_of,
@@ -18,7 +19,6 @@ from mav_tasks.tasks.driving.mission_sequencer import (
 )
 from mav_tasks.tasks.driving.stage import is_off_line
 from mav_tasks.tasks.events import SERVER, QueueContinued
-from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import MoveTurned, Plan, Rotate
 from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, LastHalt
 from mav_tasks.tasks.lifecycle import (

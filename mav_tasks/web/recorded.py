@@ -22,7 +22,7 @@ from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.recording.sources import Happened, Heard, items_of
 from mav_tasks.services.persona import persona_of
-from mav_tasks.services.text_receiver import TextReceiver
+from mav_tasks.services.statustext import TextReceiver
 from mav_tasks.tasks.events import TaskProgressed
 
 WANTED = frozenset({m.Heartbeat.id, m.LocalPositionNed.id, m.Attitude.id, m.Statustext.id})

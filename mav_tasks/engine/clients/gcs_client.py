@@ -8,7 +8,7 @@ from mav_tasks.engine.clients.sender import OBSERVED, Memory, Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.engine.clients.vehicle_view import LONGEST_US, STREAMED, Pace, VehicleView
 from mav_tasks.engine.inputs import FLEET_LINK
-from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.packets import PacketSender
 from mav_tasks.engine.timers import Timer
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.latest import keep_latest, shorten

@@ -6,16 +6,16 @@ decides by sender and size alone, before parsing, which costs more. ``receive`` 
 packet as a value; the engine acts on it.
 """
 
+import re
 from collections.abc import Callable, Collection
-from itertools import repeat
+from itertools import islice, repeat
 from operator import itemgetter
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
 from mav_tasks.engine.clients.rights import rights_of
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
-from mav_tasks.engine.clients.stop_packets import stops_in
-from mav_tasks.engine.commands.words import row_said
+from mav_tasks.engine.commands.command_request import row_said
 from mav_tasks.engine.inputs import (
     Congestion,
     LinkChanged,
@@ -25,18 +25,48 @@ from mav_tasks.engine.inputs import (
     PeerChanged,
     Place,
 )
-from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.packets import PacketSender
 from mav_tasks.engine.policy import Row, row_of
 from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Packer, target_of
-from mav_tasks.mavlink.enums import MavSeverity
-from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.enums import MavCmd, MavSeverity
+from mav_tasks.mavlink.packet import (
+    CRC,
+    HEADER_V1,
+    HEADER_V2,
+    MAGIC_V2,
+    SIGNATURE_LENGTH,
+    SIGNED,
+    Packet,
+)
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.services.command_receiver import Command, command_of, is_stop
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
+
+_NUMBER = re.escape(int(MavCmd.TASK_STOP).to_bytes(2, "little"))
+#: the start of a STOP, MAVLink 1 or 2: COMMAND_INT or COMMAND_LONG, with its command number
+_STOP = re.compile(
+    rb"\xfe.{4}[\x4b\x4c].{28}" + _NUMBER + rb"|\xfd.{6}[\x4b\x4c]\0\0.{28}" + _NUMBER, re.DOTALL
+)
+MOST_STOPS = 16  # from one datagram: routers put several packets into one
+
+
+def stops_in(data: bytes) -> bytes:
+    """Return the joined parts of a datagram that look like STOP packets, or b""."""
+    found = islice(_STOP.finditer(data), MOST_STOPS)
+    return b"".join(_packet_at(data, each.start()) for each in found)
+
+
+def _packet_at(data: bytes, start: int) -> bytes:
+    packet = data[start:]
+    if packet[0] == MAGIC_V2:
+        is_signed = packet[2] & SIGNED
+        return packet[: packet[1] + HEADER_V2 + CRC + (SIGNATURE_LENGTH if is_signed else 0)]
+    return packet[: packet[1] + HEADER_V1 + CRC]
+
 
 MAX_LINK_NUMBER = 255  # limit of its field in TASK_STATUS
 NEWCOMERS = 2.0  # new unsigned clients a second, on average; the burst is ``max_clients``

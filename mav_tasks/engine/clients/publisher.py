@@ -15,18 +15,17 @@ from math import inf
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
-from mav_tasks.engine.clients.summary import next_words, summary_of
 from mav_tasks.engine.commands import translate
-from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.commands.submissions import PAUSED, Submissions
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.control import Event as ControlEvent
-from mav_tasks.engine.vehicles.hands import Word
+from mav_tasks.engine.vehicles.joint_control import BUTTONS, Word
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavSeverity, MavState, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.heartbeat import INTERVAL, component_heartbeat
 from mav_tasks.services.rate_budget import granted
+from mav_tasks.services.vehicle_status import INTERVAL, component_heartbeat
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import (
     Event,
@@ -38,9 +37,51 @@ from mav_tasks.tasks.events import (
     TaskSubmitted,
     TaskWaits,
 )
-from mav_tasks.tasks.lifecycle import TERMINAL
+from mav_tasks.tasks.goal import describe
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, words_of
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import TaskId
+from mav_tasks.tasks.task import Task, TaskId
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+
+
+def summary_of(tasks: VehicleTasks) -> str:
+    """Return why a rover's tasks are stopped, and what to press; "" if they are not."""
+    waiting = len(tasks.waiting)
+    wait = f"; {_waiting(waiting)}" if waiting else ""
+    held = _in_state(tasks, TaskState.HELD)
+    if tasks.paused is TaskReason.STOPPED:
+        return f"STOP in force, press Continue{wait}"
+    if held is not None:
+        return f"Task {held.id} held: {words_of(held.reason)}. Press {BUTTONS}{wait}"
+    active = _in_state(tasks, TaskState.PAUSED)
+    why = PAUSED.get(tasks.paused, words_of(tasks.paused))
+    if tasks.paused and active is not None:
+        return f"Task {active.id} paused, press Continue ({why}){wait}"
+    if tasks.paused and waiting:
+        return f"{_waiting(waiting)}, press Continue ({why})"
+    return ""
+
+
+def next_words(tasks: VehicleTasks) -> str:
+    """Return which task drives next, to end a text; "" if none does."""
+    task_id = None if tasks.held else tasks.executor.task_id or tasks.next_id
+    task = None if task_id is None else tasks.registry[task_id]
+    if task is None or task.state is TaskState.CANCELLING:
+        return ""
+    behind = len(tasks.waiting) - (task.id in tasks.waiting)
+    wait = f"; {_waiting(behind)} behind it" if behind else ""
+    return f": task {task.id} is next, {describe(task.goal)}{wait}"
+
+
+def _waiting(count: int) -> str:
+    return "1 task waits" if count == 1 else f"{count} tasks wait"
+
+
+def _in_state(tasks: VehicleTasks, state: TaskState) -> Task | None:
+    """Return the first active or suspended task in this state."""
+    active = [] if tasks.active is None else [tasks.active]
+    return next((task for task in (*active, *tasks.suspended) if task.state is state), None)
+
 
 UNHEARD = Word(text="is paused: no ground station is heard")
 

@@ -28,7 +28,7 @@ from mav_tasks.mavlink.signing import (
     timestamp_of,
 )
 from mav_tasks.tasks.events import SignatureRefused, SignaturesSeen, SignatureTime
-from mav_tasks.tasks.signing_lead import DECAY, STEP
+from mav_tasks.tasks.fleet import DECAY, STEP
 
 #: stands for the key of unsigned packets, where they are allowed
 UNSIGNED = Key("", b"", fingerprint="-")

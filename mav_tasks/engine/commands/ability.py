@@ -1,8 +1,9 @@
-"""Refuses or adapts goals that a vehicle cannot drive, by its setpoints or its steering."""
+"""Refuses or adapts goals that a vehicle cannot drive: its setpoints, steering, reach, fence."""
 
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
+from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Turning
@@ -138,3 +139,20 @@ def _check_course(goal: Step, ability: Ability) -> None:
 
 def _cannot(words: str, *, param: int = 0) -> Rejection:
     return Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words, param=param)
+
+
+R = TaskReason
+
+
+def check_reach(vehicle: Vehicle, goal: GoTo, *, name: str = "the place", param: int = 0) -> None:
+    """Raise Rejection for a place too far away, by a typing error, or outside the fence.
+
+    ``name`` and ``param``: what it calls the place, and the number of its parameter.
+    """
+    far = vehicle.where.distance_to(goal)
+    longest = vehicle.parts.settings.driving.max_distance
+    if far is not None and far > longest:
+        words = f"{name} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
+        raise Rejection(R.BAD_PARAMETER, words, param=param)
+    if not vehicle.where.is_within_fence(goal):
+        raise Rejection(R.OUTSIDE_FENCE, f"{name} is outside the fence")

@@ -1,4 +1,4 @@
-"""A client's command while the server handles it: sender, vehicle, content, and its answer."""
+"""A client's command while the server handles it: its kind, sender, vehicle and answer."""
 
 from collections.abc import Hashable, Iterator
 from typing import Self
@@ -6,18 +6,65 @@ from typing import Self
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands import translate
-from mav_tasks.engine.commands.goals import CHANGE_MODE, marks_of, reposition_flags
-from mav_tasks.engine.commands.words import SET_MODE, kind_of
-from mav_tasks.engine.policy import Kind, Row, row_of_command
+from mav_tasks.engine.commands.goals import CHANGE_MODE, has_place, marks_of, reposition_flags
+from mav_tasks.engine.policy import (
+    COMMANDS,
+    DISARM,
+    PAUSE,
+    PAUSE_HERE,
+    Kind,
+    Row,
+    row_of_command,
+)
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import NO_MESSAGE, Answer, Command
+from mav_tasks.services.command_receiver import NO_MESSAGE, REPEATED, Answer, Command
+from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Marks, Submitter
+
+#: commands whose parameters decide their row
+AMBIGUOUS = frozenset({MavCmd.COMPONENT_ARM_DISARM, MavCmd.DO_PAUSE_CONTINUE, MavCmd.DO_REPOSITION})
+SET_MODE = int(MavCmd.DO_SET_MODE)
+#: commands that end tasks: a copy must not end later ones
+OF_ONE_TASK = (MavCmd.TASK_CANCEL, MavCmd.TASK_CLEAR)
+
+
+def row_said(command: Command) -> Row:
+    """Return the row of a command by its content; ``ModeRequests`` looks closer at modes."""
+    if command.command in AMBIGUOUS:
+        match command.command, command.params[0]:
+            case MavCmd.COMPONENT_ARM_DISARM, 0.0:
+                return DISARM
+            case MavCmd.DO_PAUSE_CONTINUE, 0.0:
+                return PAUSE
+            case MavCmd.DO_REPOSITION, _ if not has_place(command):
+                return PAUSE_HERE
+    return COMMANDS.get(command.command) or row_of_command(command.command)
+
+
+def kind_of(command: Command, row: Row, persona: Persona) -> Kind:
+    """Return the kind of a command with this row; HOLD is a HALT, any other mode a GO."""
+    if command.command != SET_MODE:
+        return row.kind
+    return Kind.HALT if persona.mode_in(*command.params[1:3]) == persona.hold_mode else Kind.GO
+
+
+def halts_again(command: Command, persona: Persona, *, after: float) -> bool:
+    """Whether a command is executed again when the same packet comes ``after`` so many seconds.
+
+    Every halt is: some senders do not count their packets, so it may be a new command. TASK_CANCEL
+    by id is not, as it means one task. TASK_CANCEL without an id and TASK_CLEAR are executed again
+    after REPEATED seconds, when they mean other tasks.
+    """
+    if command.command in OF_ONE_TASK:
+        is_by_id = command.command == MavCmd.TASK_CANCEL and command.params[0] != 0.0
+        return after > REPEATED and not is_by_id
+    return kind_of(command, row_said(command), persona) is Kind.HALT
 
 
 class CommandRequest:

@@ -14,7 +14,8 @@ from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.any_rover import AnyRover
-from mav_tasks.engine.commands.command_request import CommandRequest
+from mav_tasks.engine.commands.command_request import CommandRequest, halts_again
+from mav_tasks.engine.commands.forwarding import check_relay, relay
 from mav_tasks.engine.commands.goals import (
     GOALS,
     bad,
@@ -23,11 +24,9 @@ from mav_tasks.engine.commands.goals import (
 )
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
-from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions, leave_it
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import message_id_of, result_of
-from mav_tasks.engine.commands.words import halts_again
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide

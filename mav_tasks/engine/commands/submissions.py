@@ -7,19 +7,16 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
 from mav_tasks.engine.clients.sender import Said
-from mav_tasks.engine.commands.ability import driven
-from mav_tasks.engine.commands.command_request import CommandRequest
-from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
+from mav_tasks.engine.commands.ability import check_reach, driven
+from mav_tasks.engine.commands.command_request import OF_ONE_TASK, CommandRequest
 from mav_tasks.engine.commands.goals import parse_command
 from mav_tasks.engine.commands.ordering import (
     AGAIN,
     has_left_before_halt,
     why_older,
 )
-from mav_tasks.engine.commands.reach import check_reach
 from mav_tasks.engine.commands.translate import IN_FORCE, result_of
-from mav_tasks.engine.commands.words import OF_ONE_TASK
-from mav_tasks.engine.commit_gate import CommitGate
+from mav_tasks.engine.commit_gate import CommitGate, DependencyQuestions
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.engine.timers import Effect, Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle

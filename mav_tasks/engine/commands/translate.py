@@ -293,11 +293,6 @@ def task_id_of(command: Command) -> int:
     return number if large is not None or number <= EXACT else -1
 
 
-def _float32(value: float) -> float:
-    """Return a number that fits a float32; NaN (unknown) if it is too large."""
-    return value if abs(value) < FLOAT32_MAX else nan
-
-
 def whole_of(value: float) -> int:
     """Return a parameter that is a number from 0 on; -1 if it is invalid."""
     return int(value) if isfinite(value) and value == int(value) and value >= 0 else -1
@@ -308,7 +303,7 @@ def _left(task: Task, tasks: VehicleTasks) -> tuple[int, float]:
     if isinstance(task.goal, GoTo | Plan) and task.progress.anchor and task.state not in TERMINAL:
         way = time_left(task.goal, task.progress, known_of(tasks)).metres
         if way > 0.0:
-            return UNIT_METRES, _float32(way)
+            return UNIT_METRES, way if way < FLOAT32_MAX else nan
     goal = present_goal(task.goal, task.progress)
     if task.progress.anchor is not None:
         leg = leg_of(goal, task.progress)

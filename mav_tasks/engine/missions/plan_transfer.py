@@ -16,20 +16,18 @@ from typing import Protocol
 from zlib import crc32
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.commands.ability import check_reach
 from mav_tasks.engine.commands.assignments import check_any, driven_by
-from mav_tasks.engine.commands.reach import check_reach
+from mav_tasks.engine.commands.command_request import CommandRequest, row_said
 from mav_tasks.engine.commands.submissions import chosen_words
-from mav_tasks.engine.commands.words import row_said
-from mav_tasks.engine.missions.fence_items import (
+from mav_tasks.engine.missions.plan_items import (
+    ParsedMission,
     check_fence_item,
     check_rally_item,
     fence_for_vehicle,
     fence_of,
-)
-from mav_tasks.engine.missions.go_to_items import GuidedItemRequest
-from mav_tasks.engine.missions.plan_items import (
-    ParsedMission,
     plan_of,
+    result_of,
     skipped,
     step_of,
     steps_of,
@@ -52,9 +50,36 @@ from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, Ma
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import NO_MESSAGE, Command
 from mav_tasks.services.mission_item import Item, item_of, packed
+from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import GoTo, Plan, Step, describe, number_of
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.task import ANY, Draft, Marks, Submitter
+
+
+class GuidedItemRequest(CommandRequest):
+    """A request by mission item, answered with a MISSION_ACK."""
+
+    @property
+    def is_go_to(self) -> bool:
+        """True: the item is always a "go to"."""
+        return True
+
+    def answer(self, result: MavResult, result_param2: int = 0) -> None:
+        """Send the MISSION_ACK of an accepted item; ``refuse`` sends all others."""
+        if result is MavResult.ACCEPTED:
+            self._ack(MavMissionResult.ACCEPTED, result_param2)
+
+    def refuse(
+        self, refusal: Rejection, *, now: float, result: MavResult | None = None
+    ) -> SubmissionRefused:
+        """Answer with the result and a text; return the event for the audit log."""
+        self._ack(result_of(refusal))
+        return super().refuse(refusal, result=result, now=now)
+
+    def _ack(self, result: MavMissionResult, opaque_id: int = 0) -> None:
+        ack = m.MissionAck(*self.packet.source, result, MavMissionType.MISSION, opaque_id)
+        self.client.outlet.send(ack, self.answering)
+
 
 R = TaskReason
 

@@ -9,8 +9,7 @@ from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
-from mav_tasks.engine.missions.fence_items import fence_of, rally_of
-from mav_tasks.engine.missions.plan_items import plan_of, steps_of
+from mav_tasks.engine.missions.plan_items import fence_of, plan_of, rally_of, steps_of
 from mav_tasks.engine.missions.plan_table import MissionParseOptions
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection

@@ -12,9 +12,11 @@ from mav_tasks.engine.policy.commands import (
     PAUSE,
     PAUSE_HERE,
     TASK_COMMANDS,
+    UNKNOWN,
+    Kind,
+    Row,
 )
 from mav_tasks.engine.policy.messages import BOUNDING_PLAN, GO_TO_ITEM, MESSAGES, READ_FILE
-from mav_tasks.engine.policy.row import UNKNOWN, Kind, Row
 from mav_tasks.mavlink import messages as m
 from mav_tasks.services import file_transfer
 

@@ -7,8 +7,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY, SUBMITTER
-from mav_tasks.engine.policy.commands import ACTS, ASKS, BOUNDS, GOES, MOVES, handled, named
-from mav_tasks.engine.policy.row import Kind, Row
+from mav_tasks.engine.policy.commands import (
+    ACTS,
+    ASKS,
+    BOUNDS,
+    GOES,
+    MOVES,
+    Kind,
+    Row,
+    handled,
+    named,
+)
 
 SETS = Row("", Kind.WISH, SAFETY, "sets parameters, writes files, erases logs", is_bound=True)
 TELLS = Row("", Kind.TELL, OPERATOR, "corrections, acknowledgements, identification")

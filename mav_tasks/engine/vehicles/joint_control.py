@@ -1,26 +1,246 @@
-"""Joint control of one vehicle: passes each request and each event through the control table once.
+"""Joint control of one vehicle: passes each request and event through the table of control once.
 
 STOP comes first, then what somebody else did to the vehicle, then what we want. A vehicle that is
-not ours gets no set-point at all.
+not ours gets no set-point at all. ``state_of`` says in which state it is; ``carry_out`` has one
+case for each effect, and decides nothing.
 """
 
 from collections.abc import Callable, Hashable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
+from typing import Any, NamedTuple, assert_never
 
-from mav_tasks.engine.vehicles.armings import SHOWN_LATE
-from mav_tasks.engine.vehicles.control import Event, effects_of
-from mav_tasks.engine.vehicles.facts import client_driving, state_of
-from mav_tasks.engine.vehicles.hands import Reach, Word, carry_out
-from mav_tasks.engine.vehicles.joint_state import State
+from mav_tasks.engine.vehicles.authority import SHOWN_LATE
+from mav_tasks.engine.vehicles.control import (
+    NOTHING,
+    Driver,
+    Effect,
+    Event,
+    Grip,
+    Queue,
+    State,
+    Waits,
+    Work,
+    effects_of,
+)
 from mav_tasks.engine.vehicles.parts import HoldBefore, Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import Address
-from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, RUNNING, TaskReason
+from mav_tasks.services.orders import Phase
+from mav_tasks.tasks.events import SERVER
+from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, RUNNING, TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import ModeKind, VehicleView
+
+GRIPS = {
+    Phase.IDLE: Grip.FREE,
+    Phase.LOOKING: Grip.TAKING,
+    Phase.ASKING_HOLD: Grip.TAKING,
+    Phase.ASKING_ARM: Grip.TAKING,
+    Phase.LEADING_IN: Grip.TAKING,
+    Phase.ASKING_MODE: Grip.TAKING,
+    Phase.CONTROL: Grip.DRIVING,
+    Phase.RELEASING: Grip.RELEASING,
+    Phase.DISARMING: Grip.RELEASING,
+    Phase.STOPPING: Grip.STOPPING,
+}
+
+
+def state_of(parts: Parts, pilot: Pilot, *, is_late: bool, now: float) -> State:
+    """Return the state; ``is_late``: packets from before the last STOP may still arrive."""
+    persona, tasks, authority = parts.persona, parts.tasks, parts.authority
+    kind = authority.kind_of(parts.monitor.custom_mode, armed=parts.monitor.armed)
+    return State(
+        queue=_queue(tasks.paused),
+        grip=GRIPS[parts.control.phase],
+        work=_work(tasks),
+        driver=_driver(parts, now=now),
+        armed=parts.monitor.armed,
+        may_be_armed=parts.monitor.may_be_armed or parts.armings.are_by_client(now=now),
+        may_arm=authority.may_arm,
+        waits=_waits(parts, now=now),
+        is_led=kind in (ModeKind.MANUAL, ModeKind.OTHER),
+        is_urgent=tasks.immediate is not None,
+        is_idle=tasks.is_idle,
+        is_stopping=pilot.guard.is_on,
+        is_late=is_late,
+        lingers=persona.is_held_before_places,
+        has_failsafe=persona.has_loss_failsafe,
+        heeds_stick=persona.heeds_throttle_stick,
+        brakes=pilot.brakes_against_stick(now=now),
+    )
+
+
+def client_driving(parts: Parts, *, now: float) -> Hashable:
+    """Return the client whose set-points the vehicle may still follow, or None."""
+    return parts.authority.driver(within=parts.settings.watch.other_controller, now=now)
+
+
+def _queue(paused: TaskReason) -> Queue:
+    if not paused:
+        return Queue.RUNS
+    if paused is TaskReason.STOPPED:
+        return Queue.STOPPED
+    return Queue.TAKEN if paused in TAKEN else Queue.PAUSED
+
+
+def _work(tasks: VehicleTasks) -> Work:
+    active = tasks.active
+    if active is None:
+        return Work.NONE if tasks.is_empty else Work.WAITS
+    if active.state in RUNNING:
+        return Work.ENDS if active.state is TaskState.CANCELLING else Work.RUNS
+    if active.reason in TAKEN:
+        return Work.TAKEN
+    return Work.LOST if tasks.executor.resumes_by_itself else Work.STANDS
+
+
+def _driver(parts: Parts, *, now: float) -> Driver:
+    if client_driving(parts, now=now) is not None:
+        return Driver.CLIENT
+    return Driver.OTHERS if parts.is_driven_by_others(now=now) else Driver.NOBODY
+
+
+def _waits(parts: Parts, *, now: float) -> Waits:
+    waits = NOTHING if parts.hold_before.holder(now=now) is None else Waits.GO_TO
+    if parts.start.holder(now=now) is not None:
+        waits |= Waits.START
+    if parts.tasks.released is not None:
+        waits |= Waits.RELEASE
+    return waits | Waits.GRANT if parts.authority.has_any_grant else waits
+
+
+#: the buttons of a ground station for a held task
+BUTTONS = '"Held: remainder", "Held: again" or "Held: skip"'
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """An event's particulars: reason, actor, the text to report, and the request itself."""
+
+    reason: TaskReason = TaskReason.OPERATOR
+    actor: str = SERVER
+    text: str = ""
+    do: Callable[[], Any] = lambda: None  # raises Rejection if refused
+    sender: Hashable = None  # sender of a HOLD that a "go to" may undo
+    pauses: bool = False  # of such a HOLD: the queue ran
+    clear: bool = False  # of a STOP: also cancel all other tasks
+
+
+class Reach(NamedTuple):
+    """What effects work on."""
+
+    parts: Parts
+    pilot: Pilot
+    step: Callable[[float], None]  # runs the tasks, and carries out their demand, at a time
+
+
+def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
+    """Carry out one effect and return its result. Raise Rejection if DO was refused."""
+    parts, pilot, step = on
+    tasks, control, requests = parts.tasks, parts.control, parts.requests
+    match effect:
+        # how it is stopped
+        case Effect.BRAKE:
+            pilot.begin_stop(brakes=True, now=now)
+        case Effect.HOLD_AT_ONCE:
+            pilot.begin_stop(brakes=False, now=now)
+        case Effect.LET_GO:
+            pilot.let_go(now=now)
+        case Effect.STEP:
+            step(now)
+        case Effect.WATCH:
+            pilot.watch(now=now)
+        case Effect.ZERO:
+            requests.send_zero()
+        case Effect.ZERO_KEPT:
+            if control.is_streaming:
+                requests.send_zero()
+        case Effect.ZERO_AND_HOLD:
+            requests.send_zero_and_hold()
+        case Effect.STAY:
+            control.ask_to_stay(now=now)
+            requests.flush(now=now)
+        case Effect.REGAIN:
+            pilot.regain(now=now)
+        case Effect.LOSE:
+            tasks.stopping_after_kill = False
+            control.lose()
+            requests.end_performing()
+        # earlier requests must not take effect later
+        case Effect.FORGET_GO_TO:
+            parts.forget_go_to()
+        case Effect.FORGET_START:
+            parts.forget_start()
+        case Effect.FORGET_RELEASE:
+            tasks.release_permit.end()
+        case Effect.REVOKE:
+            parts.authority.revoke()
+        case Effect.OUTDATE:
+            tasks.halts.term += 1
+        # the tasks
+        case Effect.COUNT:
+            tasks.halt(word.reason, actor=word.actor, now=now)
+        case Effect.PAUSE:
+            return tasks.pause(TaskReason.OPERATOR, actor=word.actor, now=now)
+        case Effect.PAUSE_TAKEN:
+            reason = word.reason if word.reason in TAKEN else TaskReason.TAKEOVER
+            return tasks.pause(reason, actor=word.actor, now=now)
+        case Effect.LATCH:
+            return tasks.stop(clear=word.clear, actor=word.actor, now=now)
+        case Effect.HOLD_TASK:
+            tasks.hold(word.reason, now=now)
+        case Effect.DO:
+            return word.do()
+        case Effect.WAKE:
+            if not pilot.clock.is_running:  # otherwise a tick is about to run them
+                step(now)
+        # permissions and reports
+        case Effect.WITHDRAW_ARMING:
+            parts.withdraw_arming(now=now)
+        case Effect.RESTORE_ARMING:
+            parts.authority.restore_arming()
+            parts.armings.forget_halts()
+            tasks.let_arm(may_be_armed=True, now=now)
+        case Effect.OUTDATE_ARMING:
+            ours, armed = control.arming_asked_at, parts.monitor.armed
+            parts.armings.outdate(ours=ours, armed=armed, now=now)
+        case Effect.OUTDATE_OUR_ARMING:
+            ours, armed = control.arming_asked_at, parts.monitor.armed
+            parts.armings.outdate_ours(ours=ours, armed=armed, now=now)
+        case Effect.EXPECT_DISARMED:
+            parts.armings.is_to_be_disarmed = parts.monitor.armed
+        case Effect.DISARM:
+            control.disarm_now(now=now)
+            requests.flush(now=now)
+        case Effect.LINGER:
+            parts.held_by(word.sender, has_paused=word.pauses, now=now)
+        case Effect.HAND_OVER:
+            control.hand_over()
+        case Effect.KEEP_ARMED:
+            control.keep_armed()
+        case Effect.DISARM_AT_END:
+            control.disarm_at_end()
+        case Effect.NOTE_OTHERS:
+            parts.authority.other_at = now
+        case Effect.LEFT:
+            tasks.executor.setpoint_left(now=now)
+        case Effect.TELL:
+            parts.note(word.text, now=now)
+        case Effect.TELL_TAKEN:
+            parts.note(f"taken over: {word.text}", now=now)
+        case Effect.TELL_STICK:
+            parts.note("has a stick off centre: HOLD is set. Centre it", now=now)
+        case Effect.TELL_HELD:
+            if held := tasks.held:
+                parts.note(f"keeps task {held.id} on hold: press {BUTTONS}", now=now)
+        case _:
+            assert_never(effect)
+    return None
+
 
 R = TaskReason
 

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.parts import Parts
-from mav_tasks.services.phase import Phase
+from mav_tasks.services.orders import Phase
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 

@@ -8,8 +8,8 @@ that does not match is reported, and not used.
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.mavlink import messages as m
 from mav_tasks.services import loss_failsafe as loss
-from mav_tasks.services.identity import VehicleIdentity
 from mav_tasks.services.persona import Persona, with_turning, with_yaw_rate
+from mav_tasks.services.vehicle_status import VehicleIdentity
 from mav_tasks.settings import SET_FAILSAFE, Settings, Turning, VehicleProfile
 
 NO_MISSION = (0, 0xFFFF)  # MISSION_CURRENT.total: it does not say; there is none

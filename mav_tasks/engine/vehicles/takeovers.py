@@ -8,11 +8,9 @@ from collections.abc import Callable
 from functools import partial
 from math import inf
 
-from mav_tasks.engine.vehicles.armings import SHOWN_LATE
-from mav_tasks.engine.vehicles.authority import Before
+from mav_tasks.engine.vehicles.authority import SHOWN_LATE, Before
 from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.hands import BUTTONS, Word
-from mav_tasks.engine.vehicles.joint_control import JointControl
+from mav_tasks.engine.vehicles.joint_control import BUTTONS, JointControl, Word
 from mav_tasks.engine.vehicles.motion_guard import NEARLY_STANDS
 from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts

@@ -1,26 +1,25 @@
 """One vehicle: dispatches its messages and requests to the parts that decide about it.
 
 ``joint`` decides who may move it, ``pilot`` what drives it. ``takeovers`` detects what others have
-done to it. ``commands.motion_gate`` decides whether a client's set-points pass.
+done to it. ``commands.forwarding`` decides whether a client's set-points pass.
 """
 
+from collections import OrderedDict
 from collections.abc import Hashable
 from math import inf
+from typing import NamedTuple
 
-from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.clients.sender import Sender
+from mav_tasks.engine.packets import LeaseWatch, PacketSender
 from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
-from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.go_words import GoWords
-from mav_tasks.engine.vehicles.hands import Word
-from mav_tasks.engine.vehicles.joint_control import JointControl
-from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
+from mav_tasks.engine.vehicles.joint_control import JointControl, Word
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
-from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
+from mav_tasks.engine.vehicles.shown import ShownHeartbeat
 from mav_tasks.engine.vehicles.takeovers import Takeovers
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
@@ -28,18 +27,85 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import COPIED, DOUBLED
 from mav_tasks.services.command_sender import Standing
-from mav_tasks.services.heartbeat import HeartbeatMonitor, kind_of
-from mav_tasks.services.identity import identity_of, uid_of
 from mav_tasks.services.persona import Persona
-from mav_tasks.services.sys_status import charge_of
+from mav_tasks.services.vehicle_status import (
+    HeartbeatMonitor,
+    charge_of,
+    identity_of,
+    kind_of,
+    uid_of,
+)
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.halts import LastHalt
+from mav_tasks.tasks.halts import LastHalt, Permit
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
-from mav_tasks.tasks.permit import Permit
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
+
+PLACES = 4  # component ids that the server may use, from the configured one on
+
+
+class Components(set[int]):
+    """The components heard in one vehicle's system, among them the autopilot."""
+
+    def __init__(self, system_id: int, *, first: int) -> None:
+        super().__init__()
+        self._places = [Address(system_id, first + number) for number in range(PLACES)]
+        #: the task server's address inside this vehicle's system
+        self.server = self._places[0]
+        self.note(AUTOPILOT)
+
+    def note(self, component_id: int) -> bool:
+        """Note a component that was heard. Return whether the server's address changes by it."""
+        before = self.server
+        self.add(component_id)
+        free = (place for place in self._places if place.component_id not in self)
+        self.server = next(free, self._places[0])
+        return self.server != before
+
+
+REMEMBERED = 1024  # packets
+PRESENT = 3.0  # s since its last packet, in which a sender counts as present
+
+
+class _Said(NamedTuple):
+    sender: Sender
+    epoch: int  # the vehicle's halt epoch when the first copy came
+    at: float  # s, when the last copy came
+
+
+class GoWords:
+    """The memory of such packets."""
+
+    def __init__(self) -> None:
+        self._said: OrderedDict[bytes, _Said] = OrderedDict()
+
+    def __repr__(self) -> str:
+        return f"GoWords({len(self._said)})"
+
+    def first_epoch(self, packet: bytes, sender: Sender, *, now: float) -> int | None:
+        """Return the halt epoch at which this packet first came elsewhere, or None if it did not.
+
+        If its first sender is gone, the packet counts as a copy for COPIED s only: a restarted
+        program sends the same bytes from another port.
+        """
+        said = self._said.get(packet)
+        if said is None or said.sender is sender:
+            return None
+        within = DOUBLED if now - said.sender.line.heard_at <= PRESENT else COPIED
+        return said.epoch if now - said.at <= within else None
+
+    def says(self, packet: bytes, sender: Sender, *, epoch: int, now: float) -> None:
+        """Remember a packet; its first sender stays its sender."""
+        before = self._said.pop(packet, None)
+        is_known = before is not None and now - before.at <= DOUBLED
+        who = before.sender if before is not None and is_known else sender
+        self._said[packet] = _Said(who, epoch, now)
+        if len(self._said) > REMEMBERED:
+            self._said.popitem(last=False)
+
 
 REORDERED = 127  # packets by which a network may reorder one, as far as numbers can show
 SILENT = 0.5  # s without any packet of the autopilot

@@ -13,8 +13,8 @@ from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.mavlink.messages import Attitude, GlobalPositionInt, GpsGlobalOrigin, HomePosition
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.frames import local_place, origin_of, to_local
 from mav_tasks.tasks.driving.path import distance
-from mav_tasks.tasks.frames import local_place, origin_of, to_local
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Step
 from mav_tasks.tasks.task import Frame
 

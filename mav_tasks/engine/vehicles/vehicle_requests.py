@@ -7,7 +7,7 @@ from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.engine.inputs import Outgoing, Place
-from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.packets import PacketSender
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -20,10 +20,9 @@ from mav_tasks.services.interval_requester import IntervalRequester
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import Done, MissionUploader
 from mav_tasks.services.offboard import OffboardControl, is_request_of
-from mav_tasks.services.orders import moves
+from mav_tasks.services.orders import Phase, moves
 from mav_tasks.services.own_parameters import OwnParameters
 from mav_tasks.services.persona import Persona
-from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.halts import Halts
 

@@ -14,7 +14,7 @@ from mav_tasks.engine.inputs import Outgoing, Peer, Place
 from mav_tasks.engine.snapshot import Reach
 from mav_tasks.engine.timers import Timer, Turn
 from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.hands import Word
+from mav_tasks.engine.vehicles.joint_control import Word
 from mav_tasks.engine.vehicles.system_ids import MOTION, NANO, Beat, Moved, Strangers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
@@ -23,10 +23,9 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.heartbeat import gcs_heartbeat, kind_of
-from mav_tasks.services.orders import DRIVEN, Orders
+from mav_tasks.services.orders import DRIVEN, Orders, Phase
 from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
-from mav_tasks.services.phase import Phase
+from mav_tasks.services.vehicle_status import gcs_heartbeat, kind_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason

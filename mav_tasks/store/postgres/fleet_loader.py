@@ -22,8 +22,8 @@ from mav_tasks.store.postgres.gateway_ownership import LIMITS, GatewayOwnership
 from mav_tasks.store.postgres.reader import PostgresReader
 from mav_tasks.store.postgres.session import Found, Session
 from mav_tasks.store.reading import read_restored
+from mav_tasks.tasks.fleet import DECAY, MOST_LEAD, STEP
 from mav_tasks.tasks.lifecycle import RUNNING
-from mav_tasks.tasks.signing_lead import DECAY, MOST_LEAD, STEP
 from mav_tasks.tasks.task import MAX_TASK_ID
 
 BLOCK = 1_000  # task ids that a gateway gets at once

@@ -9,11 +9,11 @@ from math import nan, sqrt
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving
+from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.guidance import wrap
 from mav_tasks.tasks.driving.legs import WAY, anchor_of, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import begun, following, is_over, present_goal
 from mav_tasks.tasks.driving.path import Follow, moved
-from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import (
     Drive,
     Face,

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import hypot, inf, sqrt
 
+from mav_tasks.tasks.driving.frames import to_local
 from mav_tasks.tasks.driving.path import Spot, moved, point_of
-from mav_tasks.tasks.frames import to_local
 from mav_tasks.tasks.goal import GlobalPlace
 from mav_tasks.tasks.task import Pose
 

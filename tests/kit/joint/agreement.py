@@ -10,10 +10,8 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.hands import Word
-from mav_tasks.engine.vehicles.joint_control import JointControl
-from mav_tasks.engine.vehicles.joint_state import State
+from mav_tasks.engine.vehicles.control import Event, State
+from mav_tasks.engine.vehicles.joint_control import JointControl, Word
 from rover_sim.personas import Mode
 from tests.kit.client import GUIDED, HOLD, MOVE, setpoint
 from tests.kit.joint.model import FREE, happens

@@ -8,8 +8,7 @@ from functools import cache
 from itertools import product
 from typing import Any
 
-from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event
-from mav_tasks.engine.vehicles.joint_state import Driver, Grip, Queue, State, Work
+from mav_tasks.engine.vehicles.control import STANDS, TABLE, Driver, Event, Grip, Queue, State, Work
 from tests.kit.joint.model import FREE, MAKES, START, Known, forget, happens, others_do, passes
 
 #: per event, the conditions of its rows that the graph leaves open

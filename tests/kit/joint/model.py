@@ -9,8 +9,19 @@ from functools import cache, partial
 from itertools import product
 from typing import Any, ClassVar
 
-from mav_tasks.engine.vehicles.control import Effect, Event, Step, effects_of
-from mav_tasks.engine.vehicles.joint_state import NOTHING, Driver, Grip, Queue, State, Waits, Work
+from mav_tasks.engine.vehicles.control import (
+    NOTHING,
+    Driver,
+    Effect,
+    Event,
+    Grip,
+    Queue,
+    State,
+    Step,
+    Waits,
+    Work,
+    effects_of,
+)
 
 E, F = Event, Effect
 #: properties of a PX4 and of an ArduPilot

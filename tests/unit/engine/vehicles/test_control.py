@@ -8,8 +8,19 @@ from random import Random
 
 import pytest
 
-from mav_tasks.engine.vehicles.control import STANDS, TABLE, Effect, Event, Step, effects_of
-from mav_tasks.engine.vehicles.joint_state import Driver, Grip, Queue, State, Work
+from mav_tasks.engine.vehicles.control import (
+    STANDS,
+    TABLE,
+    Driver,
+    Effect,
+    Event,
+    Grip,
+    Queue,
+    State,
+    Step,
+    Work,
+    effects_of,
+)
 from rover_sim.personas import Persona
 from tests.kit.joint.agreement import Agreement, deeds
 from tests.kit.joint.graph import PEOPLE, TIME, Graph, variants

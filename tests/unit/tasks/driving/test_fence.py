@@ -12,7 +12,7 @@ from shapely.geometry import Polygon as Shape
 
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon, Zone, check
-from mav_tasks.tasks.frames import to_global, to_local
+from mav_tasks.tasks.driving.frames import to_global, to_local
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, Jump, LocalPlace, Move, SetSpeed
 from mav_tasks.tasks.task import Pose
 

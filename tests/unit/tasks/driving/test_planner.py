@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
+from mav_tasks.tasks.driving.frames import to_global
 from mav_tasks.tasks.driving.guidance import bend_speed, steer_along, wrap
 from mav_tasks.tasks.driving.path import (
     Follow,
@@ -27,7 +28,6 @@ from mav_tasks.tasks.driving.planner import (
     way_to,
     way_to_pose,
 )
-from mav_tasks.tasks.frames import to_global
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace
 from mav_tasks.tasks.task import Bend, Pose, Progress
 from tests.unit.tasks.samples import motion

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from mav_tasks.histogram import Histogram
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.drive import Becomes, Drive
 from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.drive import Becomes, Drive
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.driving.stage import is_off_line, was_handled
 from mav_tasks.tasks.events import SERVER, TaskWaits

@@ -10,10 +10,9 @@ from typing import NamedTuple
 from mav_tasks.settings import Driving, Settings, Turning
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
-from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.bounds import Bounds, limited, within_fence
 from mav_tasks.tasks.driving.estimate import Estimate, Known, time_left
 from mav_tasks.tasks.driving.guidance import ZERO, Ending, Motion
-from mav_tasks.tasks.driving.limits import limited, within_fence
 from mav_tasks.tasks.driving.mission_sequencer import (
     begun,
     following,
