@@ -128,11 +128,12 @@ def test_a_halt_that_neither_keeps_is_reported_and_one_that_the_database_keeps_i
             outcomes += next_outcomes(store)
         store.close()
         outcomes += store.take_outcomes()
-    told = [outcome for outcome in outcomes if isinstance(outcome, HaltNotKept)]
-    assert [each.vehicle for each in told] == [2, 2]
-    assert "removed or replaced" in told[0].text
-    assert "lost: rover 2: STOP by client" in told[1].text
-    assert not restored(place).ended_well
+    at_once, at_last = (each for each in outcomes if isinstance(each, HaltNotKept))
+    assert at_once.vehicle == at_last.vehicle == 2
+    assert "removed or replaced" in at_once.text
+    assert "lost: rover 2: STOP by client" in at_last.text
+    found = restored(place)  # a database may write what was sent to it after all, once it may
+    assert found.ended_well is (2 in found.paused)
 
 
 def test_on_a_file_system_that_is_full_the_record_takes_a_stop_and_nothing_else_is_kept() -> None:
