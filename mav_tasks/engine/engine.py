@@ -40,6 +40,7 @@ from mav_tasks.engine.packets import LeaseWatch, PacketReader
 from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.snapshot import Reach, Snapshot, VehicleSnapshot
 from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.vehicles.shown import REWRITTEN
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
@@ -348,15 +349,16 @@ class Engine:
                 if self._restarts.begins_anew(packet, now=now):
                     self._gcs.continue_numbers(packet)
                 if (
-                    self._vehicles.is_answer_to_us(packet)
+                    packet is self._vehicles.answer
                     or packet.message_id == m.CommandAck.id
                     or self._reports.replaces(packet)
                 ):
                     self._publisher.withhold(packet)
                 else:
-                    is_stopped = vehicle.tasks.is_stopped
-                    shown = vehicle.shown.applied(packet, is_stopped=is_stopped, now=now)
-                    self._gcs.forward(shown, now=now)
+                    if packet.message_id in REWRITTEN:
+                        is_stopped = vehicle.tasks.is_stopped
+                        packet = vehicle.shown.applied(packet, is_stopped=is_stopped, now=now)
+                    self._gcs.forward(packet, now=now)
 
     def _halts_first(self, received: list[Received]) -> list[Received]:
         """Move packets that start or drive a rover behind those that halt one.

@@ -43,10 +43,10 @@ def _orderly(
     """Return what turns values in wire order into values in the order of definition."""
     if is_plain and not has_text and len(message.orders) > 1:
         if message.orders == sorted(message.orders):
-            return lambda values: values
+            return tuple
         return itemgetter(*message.orders)
     if is_plain and not has_text:
-        return lambda values: values
+        return tuple
     starts = [sum(message.lengths[:order]) for order in message.orders]
     lengths = [message.lengths[order] for order in message.orders]
 

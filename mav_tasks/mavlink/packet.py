@@ -104,8 +104,9 @@ def with_seq(packet: Packet, seq: int) -> bytes:
     The CRC is corrected by its linearity and never verified: no CRC_EXTRA is needed, unknown ids
     work, and what was corrupt stays corrupt.
     """
-    raw = _unsigned(packet.raw)
+    raw = packet.raw
     if raw[0] == MAGIC_V2:
+        raw = _unsigned(raw) if raw[2] & SIGNED else raw
         return raw if raw[4] == seq else _patched(raw, 4, seq)
     return raw if raw[2] == seq else _patched(raw, 2, seq)
 

@@ -61,7 +61,7 @@ class Speeds(NamedTuple):
     @property
     def is_finite(self) -> bool:
         """Whether there is a number in each."""
-        return all(isfinite(value) for value in self if value is not None)
+        return isfinite(self.forward + self.yaw_rate + (self.course or 0.0))
 
 
 STANDING = Speeds(0.0)
@@ -193,8 +193,8 @@ class Orders:
 def moves(message: Message) -> bool:
     """Whether it sets a vehicle in motion, or makes it ready for that: nothing to come late."""
     if isinstance(message, SetPositionTargetLocalNed):
-        speeds = (message.vx, message.vy, message.vz, message.yaw_rate)
-        return any(not abs(speed) < LEAST for speed in speeds)
+        is_slow = abs(message.vx) < LEAST and abs(message.vy) < LEAST and abs(message.vz) < LEAST
+        return not (is_slow and abs(message.yaw_rate) < LEAST)
     if isinstance(message, CommandLong) and message.command == MavCmd.COMPONENT_ARM_DISARM:
         return message.param1 != 0.0
     return False

@@ -43,6 +43,7 @@ class OwnParameters:
         self._asks = dict.fromkeys(of_loss, ASKS_FOR_LOSS) | dict.fromkeys(others, ASKS)
         self._asks_left = dict(self._asks)  # 0: since it has started it was heard, or is silent
         self.values: dict[str, float] = {}
+        self._look()
 
     def __repr__(self) -> str:
         return f"OwnParameters({self.values})"
@@ -53,6 +54,7 @@ class OwnParameters:
         names = [name for name in left if left[name] and loss.is_asked_for(name, self.values)]
         for name in names:
             left[name] -= 1
+        self._look()
         return [ParamRequestRead(*self._target, name.encode(), -1) for name in names]
 
     def receive(self, message: ParamValue) -> None:
@@ -65,17 +67,21 @@ class OwnParameters:
         if isfinite(value):
             self.values[name] = float(value)
             self._asks_left[name] = 0
+            self._look()
 
     def forget(self) -> None:
         """Ask again, as it has restarted; until it answers it stops and drives as before."""
         self._asks_left = dict(self._asks)
         for name in self._persona.turning_parameters:  # it may be another one
             self.values.pop(name, None)
+        self._look()
 
-    @property
-    def awaits_failsafe(self) -> bool:
-        """Whether it is being asked how it stops, and nobody knows that yet."""
-        return any(
+    def _look(self) -> None:
+        """Look anew at how it stops: this is asked for with each set-point."""
+        #: see ``loss_failsafe.fault_in``
+        self.fault = loss.fault_in(self.values)
+        #: whether it is being asked how it stops, and nobody knows that yet
+        self.awaits_failsafe = any(
             self._asks_left.get(name) and name not in self.values
             for name in loss.NAMES
             if loss.is_asked_for(name, self.values)

@@ -265,9 +265,9 @@ class GcsClient:
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Forward a vehicle's packet, unless its stream is above this client's rate."""
-        system_id = packet.system_id
+        system_id, component = packet.source
         if system_id not in self.introduced:
-            if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
+            if packet.message_id != m.Heartbeat.id or component != AUTOPILOT:
                 return
             self.introduced.add(system_id)
         number, is_silent = packet.message_id, not self.is_heard or self.is_one_of_many
@@ -275,7 +275,7 @@ class GcsClient:
             is_silent
             or (
                 number in STREAMED
-                and not self.view(system_id).passes(packet.component_id, number, now=now)
+                and not self.view(system_id).passes(component, number, now=now)
             )
         ):
             self.outlet.forward(packet)

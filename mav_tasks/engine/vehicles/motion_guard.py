@@ -23,6 +23,7 @@ reported, because a corrected position or a wrong velocity alone is no motion.
 from collections import deque
 from enum import IntEnum
 from math import inf
+from operator import itemgetter
 from typing import NamedTuple
 
 from mav_tasks.engine.vehicles.control import Event
@@ -51,6 +52,9 @@ OVERSHOOT, NOISE = 2.0, 0.6
 #: what it stands for while a task continues or starts
 GOES_ON = (DemandKind.TAKE, DemandKind.DRIVE)
 LASTS = 0.2  # s that it must last; with the speed's window it is seen within 0.5 s
+
+
+_speed = itemgetter(1)
 
 
 class Step(IntEnum):
@@ -215,7 +219,7 @@ class MotionGuard:
         self._asked.append((now, abs(asked)))
         while self._asked[0][0] < now - LATELY:
             self._asked.popleft()
-        most, motion = max(each for _, each in self._asked), self._motion.latest()
+        most, motion = max(map(_speed, self._asked)), self._motion.latest()
         slower = 0.0 if speed is None or motion is None else min(speed, motion.speed)
         if most == 0.0 or slower <= OVERSHOOT * most + NOISE:  # the ladder checks standing
             self._fast_since = inf

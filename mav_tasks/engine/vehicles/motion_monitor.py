@@ -90,7 +90,7 @@ class MotionMonitor:
         heard = self.clock.hear(message, now=now)
         if heard is not Heard.NEWS:
             return heard
-        sent_at = min(self.clock.sent_at(message.time_boot_ms, now=now), not_after)
+        sent_at = min(self.clock.news_at, not_after)
         if isinstance(message, LocalPositionNed):
             if not self._is_frozen(message):
                 self._position_at = sent_at

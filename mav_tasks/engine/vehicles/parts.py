@@ -90,10 +90,10 @@ class Parts:
     listens_until: float = -inf
     #: handle changes that a person, or a restart, has caused; no task starts before that
     undecided: list[Callable[[float], None]] = field(default_factory=list)
+    control: OffboardControl = field(init=False)
 
-    @property
-    def control(self) -> OffboardControl:
-        return self.requests.control
+    def __post_init__(self) -> None:
+        self.control = self.requests.control
 
     @property
     def actor(self) -> str:

@@ -44,8 +44,8 @@ class SelfDescription:
         """Whether it might not stop when setpoints end, as it must; False if it never answers."""
         if self._parts.settings.loss_failsafe != "must_stand":
             return False
-        why_off = loss.fault_in(self._says.values)[1]
-        return self._says.awaits_failsafe or bool(why_off) or self._is_known_to_drive_on
+        says = self._says
+        return says.awaits_failsafe or bool(says.fault[1]) or self._is_known_to_drive_on
 
     @property
     def _is_known_to_drive_on(self) -> bool:
@@ -78,7 +78,7 @@ class SelfDescription:
 
     def look(self, *, now: float) -> None:
         """Report and apply what has changed; called with each heartbeat."""
-        why_off, is_hidden = told = loss.fault_in(self._says.values)[1], self._says.hides_failsafe
+        why_off, is_hidden = told = self._says.fault[1], self._says.hides_failsafe
         before, self._told_failsafe = self._told_failsafe, told
         if is_hidden and not before[1]:
             self._parts.note("does not report whether it stops when setpoints stop", now=now)

@@ -13,8 +13,10 @@ the least difference of 20 s counts, and a delay that stays constant for longer 
 """
 
 from collections import deque
+from collections.abc import Callable
 from enum import Enum, auto
 from math import inf
+from operator import itemgetter
 
 from mav_tasks.mavlink.messages import Attitude, GlobalPositionInt, LocalPositionNed
 
@@ -40,6 +42,9 @@ WAY_THERE = 0.1
 ANOTHER_CLOCK = 60.0  # s from the vehicle's other messages; not a delay, but another clock
 
 
+_value: Callable[[tuple[float, float]], float] = itemgetter(1)
+
+
 class Heard(Enum):
     """The classification of a message by its time stamp."""
 
@@ -60,8 +65,11 @@ class SenderClock:
         self._latest: dict[int, int] = {}  # the newest ms by message id; empty: none came
         self._back_since = inf  # only older messages have come since then
         self._differences: deque[tuple[float, float]] = deque()  # (start, least) of each bucket
+        self._least = inf  # of all buckets
         self._exchanges: deque[tuple[float, float]] = deque()  # (end, lower bound of the offset)
         self._quickest = inf  # s, round trip of the quickest exchange so far
+        #: when the vehicle booted as of the last news, and when that news was sent: by our clock, s
+        self.booted = self.news_at = inf
 
     def __repr__(self) -> str:
         return f"SenderClock({self._newest} ms, quickest exchange {self._quickest:.3f} s)"
@@ -85,6 +93,8 @@ class SenderClock:
         if ms > self._newest:
             self._newest, self._newest_at, self._back_since = ms, now, inf
         self._note_difference(now - ms / 1000, now=now)
+        self.booted = self.booted_at(now=now)
+        self.news_at = _made_at(ms, self.booted, now=now)
         return Heard.NEWS
 
     def exchange(self, asked_at: float, told: float, *, now: float) -> None:
@@ -96,8 +106,7 @@ class SenderClock:
 
     def sent_at(self, time_boot_ms: int, *, now: float) -> float:
         """Return when a message that comes now was sent, by our clock; ``now`` if unknown."""
-        made_at = self._counted_on(time_boot_ms, now=now) / 1000 + self.booted_at(now=now)
-        return now if now - made_at < ROUNDING else made_at
+        return _made_at(self._counted_on(time_boot_ms, now=now), self.booted_at(now=now), now=now)
 
     def booted_at(self, *, now: float) -> float:
         """Return when the vehicle booted, by our clock: our seconds less its seconds.
@@ -108,8 +117,8 @@ class SenderClock:
         while exchanges and now - exchanges[0][0] > EXCHANGES:
             exchanges.popleft()
         if not exchanges:
-            return min((least for _, least in self._differences), default=inf)
-        most = max(least for _, least in exchanges) + min(self._quickest / 2, WAY_THERE)
+            return self._least
+        most = max(map(_value, exchanges)) + min(self._quickest / 2, WAY_THERE)
         return min(most, self._differences[-1][1])  # less if the clock has caught up since
 
     def _note_difference(self, difference: float, *, now: float) -> None:
@@ -119,8 +128,10 @@ class SenderClock:
             buckets.append((now, difference))
             while now - buckets[0][0] > WINDOW:
                 buckets.popleft()
+            self._least = min(map(_value, buckets))
         elif difference < buckets[-1][1]:
             buckets[-1] = buckets[-1][0], difference
+            self._least = min(self._least, difference)
 
     def _counted_on(self, time_boot_ms: int, *, now: float) -> int:
         """Return the ms counted on over overflows of the field."""
@@ -146,3 +157,9 @@ class SenderClock:
             return Heard.RESTART
         self._back_since = min(self._back_since, now)
         return Heard.RESTART if now - self._back_since > GONE else Heard.OLD
+
+
+def _made_at(ms: int, booted_at: float, *, now: float) -> float:
+    """Return when a message of that time stamp was made; ``now`` if it is so by its precision."""
+    made_at = ms / 1000 + booted_at
+    return now if now - made_at < ROUNDING else made_at

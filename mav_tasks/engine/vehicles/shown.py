@@ -32,6 +32,7 @@ BYTES = 4  # of custom_mode
 ARMING_CHECKS = b"\xe0\x93\xa8\x01"
 CAN_ARM = 22  # offset in its payload: the modes in which PX4 could be armed
 MISSION, LOITER = 8, 16
+REWRITTEN = frozenset({Event.id, Heartbeat.id})
 
 
 class ShownHeartbeat:
@@ -52,10 +53,10 @@ class ShownHeartbeat:
         return shown
 
     def applied(self, packet: Packet, *, is_stopped: bool, now: float) -> Packet:
-        """Return a packet of the vehicle as clients see it."""
+        """Return a packet of the vehicle, one that is REWRITTEN, as clients see it."""
         if packet.message_id == Event.id:
             return _with_mission(packet)
-        if packet.message_id != Heartbeat.id or packet.component_id != AUTOPILOT:
+        if packet.component_id != AUTOPILOT:
             return packet
         payload = packet.payload
         if len(payload) > SYSTEM_STATUS and not is_stopped:

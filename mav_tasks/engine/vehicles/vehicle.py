@@ -292,8 +292,8 @@ class Vehicle:
                 self.joint.decide(now=now)
             self._look_at_frame(now=now)
             self._takeovers.look_at_motion(now=now)
-            if not self.tasks.is_idle:
-                self.joint.wake(now=now)
+            if not (self._clock.is_running or self.tasks.is_idle):
+                self.joint.step(now)  # one may be ready
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition):
             if isinstance(message, m.HomePosition):
                 self.requests.heard_home()
@@ -424,7 +424,6 @@ class Vehicle:
         if now >= self._clock.next_at or fell_silent:
             self.joint.step(now)  # first, because it may make a request pointless
         self.requests.handle_deadline(now=now)
-        self.requests.flush(now=now)
         self._ask_for_rates(now=now)
 
     def view(self, now: float) -> VehicleView:

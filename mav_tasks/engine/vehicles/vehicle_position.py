@@ -59,7 +59,7 @@ class VehiclePosition(MotionMonitor):
         else:
             heard = super().receive(message, now=now, not_after=not_after)
         if heard is Heard.NEWS:
-            self._booted = self.clock.booted_at(now=now), now
+            self._booted = self.clock.booted, now
             if isinstance(message, GlobalPositionInt):
                 self._global = message
             if not isinstance(message, Attitude):

@@ -55,6 +55,8 @@ class VehicleRequests:
         self._source = source
         self._watch = watch
         self._outlet = outlet
+        #: the link and endpoint at which the vehicle is reached
+        self.place: Place = outlet.link, outlet.peer
         self._sender = CommandSender(source)
         #: the answers to clients' commands; who hands them on clears it
         self.answers: list[Answered] = []
@@ -76,11 +78,6 @@ class VehicleRequests:
         #: zero and HOLD as packets, for an exit on which nothing can be computed any more
         self._last_words = self._prepare_last_words()
 
-    @property
-    def place(self) -> Place:
-        """The link and endpoint at which the vehicle is reached."""
-        return self._outlet.link, self._outlet.peer
-
     def apply(self, watch: Watch) -> None:
         """Apply new settings; pending requests keep their time limits."""
         self._watch = watch
@@ -94,7 +91,7 @@ class VehicleRequests:
 
     def move_to(self, outlet: PacketSender) -> None:
         """Send to another endpoint from now on."""
-        self._outlet = outlet
+        self._outlet, self.place = outlet, (outlet.link, outlet.peer)
         self._last_words = self._prepare_last_words()
 
     def shut(self) -> None:
@@ -253,9 +250,11 @@ class VehicleRequests:
         return min(self._sender.next_deadline(), uploader.again_at, uploader.give_up_at)
 
     def handle_deadline(self, *, now: float) -> None:
-        """Repeat or give up what is due; ``flush`` sends it."""
-        self._sender.handle_deadline(now=now)
-        self._uploader.handle_deadline(now=now)
+        """Repeat or give up what is due."""
+        if now >= self.next_deadline():
+            self._sender.handle_deadline(now=now)
+            self._uploader.handle_deadline(now=now)
+            self.flush(now=now)
 
     def flush(self, *, now: float) -> bool:
         """Send what the services have queued, and hand out the answers that came.
@@ -327,8 +326,8 @@ class VehicleRequests:
         1.17.0, SITL). One that follows none, as in a client's "go to", gets HOLD.
         """
         rolls_in_hold = self._persona.brakes_by_setpoints and self.control.follows
-        said = self.parameters.values
-        if rolls_in_hold and loss_failsafe.is_said(said) and not loss_failsafe.fault_in(said)[1]:
+        said = self.parameters
+        if rolls_in_hold and loss_failsafe.is_said(said.values) and not said.fault[1]:
             return self._last_words[1:]  # all but HOLD, which comes first for one with a failsafe
         return self._last_words
 

@@ -81,7 +81,8 @@ class VehicleSide(VehicleLinks):
         self._decoder = Decoder()
         #: packet counts of the vehicle links
         self.counts = self._decoder.counts
-        self._answer: Packet | None = None  # the last answer to our TIMESYNC
+        #: the last answer to our TIMESYNC, which a client would misread
+        self.answer: Packet | None = None
         #: all vehicles by system id, read-only
         self.by_id: Mapping[int, Vehicle] = self._vehicles
         #: returns a vehicle, read-only
@@ -105,18 +106,21 @@ class VehicleSide(VehicleLinks):
     def plan(self) -> None:
         """Set the timers of the changed vehicles."""
         for system_id, vehicle in self.touched.items():
-            if timer := self._due.get(system_id):
-                timer.set(vehicle.next_deadline())
+            timer, at = self._due.get(system_id), vehicle.next_deadline()
+            if timer is not None and timer.at != at:
+                timer.set(at)
 
     def settle(self) -> list[Vehicle]:
         """Plan the changed vehicles, update what is kept of them, and return them."""
         self.plan()
-        touched = list(self.touched.values())
+        touched, registry = list(self.touched.values()), self._registry
         self.touched.clear()
         for vehicle in touched:
             system_id, tasks = vehicle.system_id, vehicle.tasks
-            first = tasks.next_id if tasks.executor.task_id is None else None
-            if first is None or self._registry.is_durable(first):
+            first = None  # what may start once it is durable
+            if registry.durable < registry.recorded and tasks.executor.task_id is None:
+                first = tasks.next_id
+            if first is None or registry.is_durable(first):
                 self._awaiting.pop(system_id, None)
             else:
                 self._awaiting[system_id] = vehicle
@@ -268,14 +272,14 @@ class VehicleSide(VehicleLinks):
             self.counts.unknown += 1
         if self._signatures.admit(link, peer, packet) is None:
             return None
-        place, number = (link, peer), packet.system_id
+        place, (number, component) = (link, peer), packet.source
         if packet.source == self.our_address or packet.message_id in SETPOINTS:
             if self.lease.is_shared and isinstance(message, m.Heartbeat | m.Timesync):
                 return None  # another gateway's, which listens here, too
             self._note_intruder(place, packet, message, now=now)
             return None
-        vehicle = self.get(number)
-        from_autopilot, beat = packet.component_id == AUTOPILOT, None
+        vehicle = self._vehicles.get(number)
+        from_autopilot, beat = component == AUTOPILOT, None
         if isinstance(message, m.Heartbeat) and from_autopilot:
             beat = Beat(place, packet, message, now)
         if vehicle is None:
@@ -302,11 +306,12 @@ class VehicleSide(VehicleLinks):
                 and self._moves(vehicle, place, message, now=now)
             ):
                 return None
-            self._answer = answer or self._answer
+            self.answer = answer or self.answer
             if told is not None:
                 clock = vehicle.where.clock
                 clock.exchange(told.ts1 / NANO, told.tc1 / NANO, now=now)
-            if from_autopilot and vehicle.shows_another(message, now=now):
+            tells = from_autopilot and isinstance(message, m.Heartbeat | m.AutopilotVersion)
+            if tells and vehicle.shows_another(message, now=now):
                 latest = vehicle.parts.monitor.latest
                 vehicle = self._succeed(beat or Beat(place, packet, latest, now), now=now)
         if vehicle is None:
@@ -314,17 +319,14 @@ class VehicleSide(VehicleLinks):
         if from_autopilot:
             vehicle.count(packet.seq, now=now)
         vehicle.requests.intervals.heard(packet.message_id)
-        if message is not None:
+        if message is not None:  # what is not read changes nothing
+            self.touched[number] = vehicle
             if beat:
                 if vehicle.is_overtaken(beat.message, now=now):
                     return vehicle  # an old mode or arming state is not news
                 vehicle.last_heartbeat = packet
-            vehicle.receive(message, packet.component_id, now=now)
+            vehicle.receive(message, component, now=now)
         return vehicle
-
-    def is_answer_to_us(self, packet: Packet) -> bool:
-        """Return whether this packet answered our TIMESYNC request; a client would misread it."""
-        return packet is self._answer
 
     def check_late(self, *, now: float) -> None:
         """After a delay, and before anything else, stop the vehicles that drove on without us."""

@@ -370,13 +370,13 @@ class Drive:
     def _note_progress(self, tick: Tick, *, executed: float) -> None:
         assert self._course is not None
         progress, registry, now = self._course.progress, self._registry, tick.now
+        share = progress.share
         if now - self._shared_at >= SHARE_EACH:
             self._shared_at = now
             left = self._left(tick, progress).seconds
             if not isnan(left):
-                share = max(progress.share, executed / max(executed + left, SHARE_EACH))
-                progress = replace(progress, share=share)
-        progress = replace(progress, execution_time=executed, driven=self._driven)
+                share = max(share, executed / max(executed + left, SHARE_EACH))
+        progress = replace(progress, share=share, execution_time=executed, driven=self._driven)
         self._course.progress = progress
         registry.note_progress(tick.task.id, progress)
         is_written = registry.durable >= self._kept_as  # no backlog for a store that is away

@@ -36,6 +36,9 @@ class PathFollower:
     steering: Steering | None = None
     #: how often a place was missed and driven to again
     misses: int = 0
+    #: the current leg, and what it follows from
+    _leg: Leg | None = None
+    _leg_of: tuple[object, ...] = ()
 
     def __repr__(self) -> str:
         return f"PathFollower({self.goal}, {self.progress})"
@@ -43,7 +46,11 @@ class PathFollower:
     @property
     def leg(self) -> Leg:
         """The current leg."""
-        return leg_of(self.goal, self.progress)
+        progress = self.progress
+        of = progress.leg, progress.anchor, progress.target, progress.path
+        if self._leg is None or of != self._leg_of:
+            self._leg, self._leg_of = leg_of(self.goal, progress), of
+        return self._leg
 
     @property
     def remaining(self) -> float:
