@@ -105,14 +105,17 @@ def test_a_blocked_store_does_not_keep_a_driving_rover_from_its_end(
 
 
 def test_nobody_is_told_of_a_task_that_is_not_durable(world: World, store: LateStore) -> None:
+    other = world.add_client("other")
+    world.run(1)
     store.delay = 0.3
-    before = len(world.client.texts())
+    before = len(other.texts())
     world.client.move(1)
     world.run(0.28)
-    assert (world.client.texts()[before:], world.client.statuses()) == ([], [])
+    assert (other.texts()[before:], world.client.statuses()) == ([], [])
     world.run(0.1)
-    assert world.client.texts()[before] == "Task 1 queued: move 1 m"
-    assert [s.task_id for s in world.client.statuses()][:1] == [1]
+    assert other.texts()[before] == "Task 1 queued: move 1 m"
+    assert not world.client.said("queued")  # it reads TASK_STATUS
+    assert world.client.statuses()[0].task_id == 1
 
 
 @for_each("delay, told_after", [(0.2, 0.2), (inf, 0.4)])

@@ -282,34 +282,22 @@ class Submissions:
     def _accept(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         """Acknowledge a durable submission with the task's id, and tell all clients.
 
-        It is a warning to a station that must press a button.
+        It is a warning to a station that must press a button. A client that reads TASK_STATUS is
+        not told of its own task what that and the acknowledgement say.
         """
         if task.id not in self._undecided:
             return  # retracted, and answered
         for each in self._undecided.pop(task.id):
             acknowledge(each, task.id)
-        tasks, source, goal = asked.vehicle.tasks, asked.vehicle.server_address, describe(task.goal)
-        paused, is_blocked = tasks.paused, True
-        if tasks.immediate == task.id:
-            words, is_blocked = f"Task {task.id} starts now: {goal}", False
-        elif paused:  # somebody else may have paused
-            is_click = asked.is_go_to and not tasks.is_stopped
-            again = ", or set Hold and click again" if is_click else ""
-            why = PAUSED.get(paused, words_of(paused))
-            words = f"Task {task.id} waits, press Continue{again} ({why}): {goal}"
-        elif tasks.is_held_ahead:
-            held = "a task" if tasks.held is None else f"task {tasks.held.id}"
-            words = f"Task {task.id} waits, press a Held button: {held} is held. {goal}"
-        else:
-            active = tasks.executor.task_id
-            ahead = "" if active is None else f" behind task {active}"
-            words = f"Task {task.id} queued{ahead}: {goal}{chosen_words(task)}"
-            is_blocked = False
-        for client in self._gcs.clients:
-            is_told_otherwise = client is not asked.client or client.uses_dialect
-            is_calm = is_told_otherwise or not is_blocked
-            severity = MavSeverity.INFO if is_calm else MavSeverity.WARNING
-            client.tell(words, severity, source, now=now)
+        tasks, own, reads = asked.vehicle.tasks, asked.client, asked.client.uses_dialect
+        is_blocked = tasks.immediate != task.id and bool(tasks.paused or tasks.is_held_ahead)
+        knows = reads and not is_blocked and not task.choice
+        told = [client for client in self._gcs.clients if client is not own or not knows]
+        words = accepted_words(asked, task) if told else ""
+        for client in told:
+            must_act = is_blocked and client is own and not reads
+            severity = MavSeverity.WARNING if must_act else MavSeverity.INFO
+            client.tell(words, severity, asked.vehicle.server_address, now=now)
 
     def _withdraw(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         if task.id not in self._undecided:
@@ -400,6 +388,23 @@ def _priority_of(submitter: Submitter, settings: Settings) -> int:
         return DEFAULT_PRIORITY
     by_address = priorities.get(submitter.address, DEFAULT_PRIORITY)
     return priorities.get(submitter.place, by_address)
+
+
+def accepted_words(asked: CommandRequest, task: Task) -> str:
+    """Return what becomes of a new task: it starts, is queued, or waits for a button."""
+    tasks, goal = asked.vehicle.tasks, describe(task.goal)
+    if tasks.immediate == task.id:
+        return f"Task {task.id} starts now: {goal}"
+    if paused := tasks.paused:  # somebody else may have paused
+        again = ", or set Hold and click again" if asked.is_go_to and not tasks.is_stopped else ""
+        why = PAUSED.get(paused, words_of(paused))
+        return f"Task {task.id} waits, press Continue{again} ({why}): {goal}"
+    if tasks.is_held_ahead:
+        held = "a task" if tasks.held is None else f"task {tasks.held.id}"
+        return f"Task {task.id} waits, press a Held button: {held} is held. {goal}"
+    active = tasks.executor.task_id
+    ahead = "" if active is None else f" behind task {active}"
+    return f"Task {task.id} queued{ahead}: {goal}{chosen_words(task)}"
 
 
 def chosen_words(task: Task) -> str:
