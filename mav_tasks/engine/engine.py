@@ -479,7 +479,8 @@ class Engine:
             if woken := self._vehicles.get(system_id):
                 woken.joint.wake(now=now)
         for vehicle in self._vehicles.settle() if self._vehicles.touched else ():
-            self._modes.look_for_arming(vehicle, now=now)
+            if vehicle.parts.start.given is not None:
+                self._modes.look_for_arming(vehicle, now=now)
             answers, unperformed = vehicle.requests.answers, vehicle.requests.unperformed
             while answers:
                 deliver(self._gcs, self._submissions, vehicle, answers.pop(0), now=now)
@@ -497,8 +498,8 @@ class Engine:
             expected = room.expected | self._questions.expected
             if expected != self._expected:
                 self._expected = frozenset(expected)
-        events = self._registry.take_events()
-        if events:
+        if self._registry.events:
+            events = self._registry.take_events()
             self._publisher.publish(events, now=now)
             self._reports.publish(events, now=now)
             self._journal += events

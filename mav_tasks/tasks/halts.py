@@ -145,19 +145,20 @@ class Permit(Generic[T]):
 
     def __init__(self, halts: Halts) -> None:
         self._halts = halts
-        self._holder: T | None = None
+        #: whoever got it last, None after ``end``; ``holder`` says whether it counts still
+        self.given: T | None = None
         self._term, self._until = -1, -inf
 
     def __repr__(self) -> str:
-        return f"Permit({self._holder}, until={self._until:.2f})"
+        return f"Permit({self.given}, until={self._until:.2f})"
 
     def give(self, holder: T, *, until: float = inf) -> None:
         """Give the permit to a holder; this replaces the previous holder."""
-        self._holder, self._term, self._until = holder, self._halts.term, until
+        self.given, self._term, self._until = holder, self._halts.term, until
 
     def end(self) -> None:
         """End the permit, because something else was requested since."""
-        self._holder = None
+        self.given = None
 
     def holder(self, *, now: float = inf, halts: int = 0) -> T | None:
         """Return the holder, or None if the permit has ended.
@@ -166,4 +167,4 @@ class Permit(Generic[T]):
         permit that was given exactly so many halts ago.
         """
         is_in_time = now < self._until or self._until == inf
-        return self._holder if is_in_time and self._term + halts == self._halts.term else None
+        return self.given if is_in_time and self._term + halts == self._halts.term else None

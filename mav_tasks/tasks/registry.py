@@ -96,7 +96,8 @@ class TaskRegistry:
         #: return a task, or None if the id is unknown or forgotten
         self.get: Callable[[int], Task | None] = cast("dict[int, Task]", self._tasks).get
         self._last_of: dict[int, int] = {}  # the number of each vehicle's last event
-        self._events: list[Event] = []
+        #: recorded, and not taken yet
+        self.events: list[Event] = []
         self.recorded = 0  # number of the last event recorded
         self.durable = 0  # number of the last event known to be durable
 
@@ -302,7 +303,7 @@ class TaskRegistry:
         self.recorded += 1
         if vehicle := getattr(event, "vehicle", 0):
             self._last_of[vehicle] = self.recorded
-        self._events.append(event)
+        self.events.append(event)
 
     def note(self, vehicle: int, words: str, *, now: float) -> None:
         """Record something about a vehicle that its operator should read."""
@@ -332,7 +333,7 @@ class TaskRegistry:
 
     def take_events(self) -> list[Event]:
         """Return the events since the last call, in order of their numbers."""
-        events, self._events = self._events, []
+        events, self.events = self.events, []
         return events
 
     def _finish(self, task_id: TaskId) -> None:

@@ -222,7 +222,8 @@ class GcsClient:
         self._changed[task_id] = None
         if len(self._changed) > MAX_CHANGED:
             shorten(self._changed, MAX_CHANGED)  # a request still shows those tasks
-        self._plan_statuses(self._statuses_from)
+        if self._statuses_from < self.statuses_due:
+            self._plan_statuses(self._statuses_from)
 
     def stream_statuses(self, vehicle: int, interval: float | None, *, now: float) -> None:
         """Stream a vehicle's active task every ``interval`` seconds; None: not at all."""

@@ -158,7 +158,7 @@ class Publisher:
                 self._submissions.gate.hold(tell, tell, now=now)
         for event in events:
             if isinstance(event, TaskSubmitted):
-                if event.task.is_made:
+                if event.task.terms.series and event.task.is_made:
                     self.note_change(event.task.id)
                 continue  # ``Submissions`` and ``MissionUploads`` tell everybody of it
             spoken = translate.text_of(event)
