@@ -48,7 +48,7 @@ from mav_tasks.plan_files import (
     fence_items,
     rally_items,
 )
-from mav_tasks.services.mission_item import Item
+from mav_tasks.services.missions import Item
 from mav_tasks.tasks.goal import Drive, Move, Rotate
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY

@@ -23,7 +23,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.mavlink.float_param import to_param
-from mav_tasks.services.mission_item import Item, message_of
+from mav_tasks.services.missions import Item, message_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
 T = TypeVar("T")

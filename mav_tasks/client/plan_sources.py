@@ -7,7 +7,7 @@ from mav_tasks import plan_files
 from mav_tasks.client import wire
 from mav_tasks.client.wire import Goal
 from mav_tasks.plan_files import PlanFile
-from mav_tasks.services.mission_item import Item
+from mav_tasks.services.missions import Item
 
 Plan = PlanFile | Sequence[Goal] | Path | str
 

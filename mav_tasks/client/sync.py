@@ -17,7 +17,7 @@ from mav_tasks.client.wire import Goal
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import PlanFile
-from mav_tasks.services.mission_item import Item
+from mav_tasks.services.missions import Item
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 

@@ -14,8 +14,7 @@ from mav_tasks.client.mission_downloader import MissionDownloader
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
-from mav_tasks.services.mission_item import Item
-from mav_tasks.services.mission_uploader import MissionUploader, Patience
+from mav_tasks.services.missions import Item, MissionUploader, Patience
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: the server gives up after 2.3 s without an item

@@ -14,7 +14,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.plan_files.values import PlanItem
-from mav_tasks.services.mission_item import Item
+from mav_tasks.services.missions import Item
 from mav_tasks.tasks.goal import (
     Drive,
     Face,

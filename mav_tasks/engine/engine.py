@@ -18,7 +18,6 @@ from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.parameters import ParameterServer, ParamMessage
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.commands.any_rover import AnyRover
@@ -33,7 +32,7 @@ from mav_tasks.engine.commit_gate import DependencyQuestions
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import FLEET_LINK, Input, LinkSide, Outgoing, Packets, Peer
 from mav_tasks.engine.missions.mission_reports import MissionReports
-from mav_tasks.engine.missions.mission_server import MissionMessage, MissionServers
+from mav_tasks.engine.missions.plan_transfer import MissionMessage, MissionServers
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.missions.transfer import MissionParts
 from mav_tasks.engine.packets import LeaseWatch, PacketReader
@@ -44,6 +43,7 @@ from mav_tasks.engine.vehicles.shown import REWRITTEN
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
+from mav_tasks.mavlink.sequence import RestartWatch
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import SubmissionDeduplicator

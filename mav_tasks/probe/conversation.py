@@ -10,7 +10,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.probe.other_traffic import SETPOINTS, OtherTraffic
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services.command_sender import CommandSender
+from mav_tasks.services.commands import CommandSender
 from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.services.statustext import TextReceiver

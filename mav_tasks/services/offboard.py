@@ -21,7 +21,7 @@ from mav_tasks.mavlink.messages import (
     Message,
     SetPositionTargetLocalNed,
 )
-from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.commands import Answered, CommandSender
 from mav_tasks.services.news import AWAITED, News
 from mav_tasks.services.orders import (
     ENDED,

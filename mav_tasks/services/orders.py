@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavType
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetPositionTargetLocalNed
-from mav_tasks.services.mission_item import NOT_GIVEN
+from mav_tasks.services.missions import NOT_GIVEN
 from mav_tasks.services.persona import Persona
 
 

@@ -27,7 +27,7 @@ SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
 #: person without an answer tries again within minutes
 NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
-RECENT = 1_000  # marks of one client; CommandReceiver has a list, too, but not after a restart
+RECENT = 1_000  # marks of one client; its packets are remembered, too, but not after a restart
 SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
 MANY_CLIENTS = 256  # remembered; beyond this, those with the oldest submissions are forgotten
 

@@ -7,7 +7,7 @@ from starlette.responses import JSONResponse
 
 from mav_tasks.errors import PlanFileError
 from mav_tasks.plan_files import PlanFile, parse_plan
-from mav_tasks.services.mission_item import CAPACITY
+from mav_tasks.services.missions import CAPACITY
 from mav_tasks.web.fields import Field
 from mav_tasks.web.plan_preview import preview_of
 

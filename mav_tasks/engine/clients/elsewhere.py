@@ -24,7 +24,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet, split_datagram
-from mav_tasks.services.command_receiver import command_of, is_stop
+from mav_tasks.services.commands import command_of, is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
 
 EVERYBODY = 0  # target_system

@@ -17,7 +17,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import statustext
-from mav_tasks.services.command_receiver import Answer
+from mav_tasks.services.commands import Answer
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
@@ -274,10 +274,7 @@ class GcsClient:
         number, is_silent = packet.message_id, not self.is_heard or self.is_one_of_many
         if number == m.Heartbeat.id or not (
             is_silent
-            or (
-                number in STREAMED
-                and not self.view(system_id).passes(component, number, now=now)
-            )
+            or (number in STREAMED and not self.view(system_id).passes(component, number, now=now))
         ):
             self.outlet.forward(packet)
         else:

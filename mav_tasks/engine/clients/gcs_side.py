@@ -42,7 +42,7 @@ from mav_tasks.mavlink.packet import (
     Packet,
 )
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.services.command_receiver import Command, command_of, is_stop
+from mav_tasks.services.commands import Command, command_of, is_stop
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 

@@ -23,7 +23,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.commands import Command
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry

@@ -37,7 +37,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Answer
+from mav_tasks.services.commands import Answer
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry

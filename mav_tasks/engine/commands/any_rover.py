@@ -31,7 +31,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult
-from mav_tasks.services.command_receiver import Answer, Command
+from mav_tasks.services.commands import Answer, Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, reused
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason

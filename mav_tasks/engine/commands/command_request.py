@@ -21,7 +21,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import NO_MESSAGE, REPEATED, Answer, Command
+from mav_tasks.services.commands import NO_MESSAGE, REPEATED, Answer, Command
 from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason

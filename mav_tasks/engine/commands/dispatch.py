@@ -35,7 +35,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import COPIED, Answer, Command
+from mav_tasks.services.commands import COPIED, Answer, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
 

@@ -31,8 +31,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
-from mav_tasks.services.command_receiver import Answer
-from mav_tasks.services.command_sender import Answered, Standing
+from mav_tasks.services.commands import Answer, Answered, Standing
 from mav_tasks.services.orders import Phase, moves
 from mav_tasks.settings import ROLES
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, STOP_IN_FORCE, TaskReason

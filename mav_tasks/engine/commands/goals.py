@@ -14,7 +14,7 @@ from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import EXACT, large_number
-from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.commands import Command
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import (
     Drive,

@@ -15,7 +15,7 @@ from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import Kind
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.services.command_receiver import COPIED, DOUBLED, Command
+from mav_tasks.services.commands import COPIED, DOUBLED, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: index of the parameter with the halt epoch that the sender was shown, by command

@@ -17,7 +17,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
-from mav_tasks.services.command_receiver import COPIED, REPEATED, Command
+from mav_tasks.services.commands import COPIED, REPEATED, Command
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry

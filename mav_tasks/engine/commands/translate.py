@@ -9,7 +9,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.float_param import EXACT, large_number
-from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.commands import Command
 from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.driving.estimate import time_left
 from mav_tasks.tasks.driving.legs import leg_count, leg_of, length_of

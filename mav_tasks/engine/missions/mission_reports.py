@@ -14,7 +14,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.mission_item import item_at
+from mav_tasks.services.missions import item_at
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import (
     Event,

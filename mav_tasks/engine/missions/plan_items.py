@@ -32,8 +32,8 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
-from mav_tasks.services.command_receiver import NO_MESSAGE, Command
-from mav_tasks.services.mission_item import Item, packed, unpacked
+from mav_tasks.services.commands import NO_MESSAGE, Command
+from mav_tasks.services.missions import Item, packed, unpacked
 from mav_tasks.tasks.driving.fence import Circle, Fence, Polygon, Zone, check
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import loops_in_vain

@@ -26,8 +26,8 @@ from mav_tasks.engine.commands.goals import (
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
-from mav_tasks.services.command_receiver import Command
-from mav_tasks.services.mission_item import NOT_GIVEN
+from mav_tasks.services.commands import Command
+from mav_tasks.services.missions import NOT_GIVEN
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import (

@@ -20,6 +20,7 @@ from mav_tasks.engine.commands.ability import check_reach
 from mav_tasks.engine.commands.assignments import check_any, driven_by
 from mav_tasks.engine.commands.command_request import CommandRequest, row_said
 from mav_tasks.engine.commands.submissions import chosen_words
+from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.engine.missions.plan_items import (
     ParsedMission,
     check_fence_item,
@@ -40,7 +41,7 @@ from mav_tasks.engine.missions.plans import (
     Stored,
     is_of_autopilot,
 )
-from mav_tasks.engine.missions.transfer import Sender, Transfer, Upload
+from mav_tasks.engine.missions.transfer import MissionParts, Sender, Transfer, Upload
 from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
@@ -48,8 +49,10 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import NO_MESSAGE, Command
-from mav_tasks.services.mission_item import Item, item_of, packed
+from mav_tasks.services.commands import NO_MESSAGE, Command
+from mav_tasks.services.missions import Item, item_of, packed
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.deduplicator import reused
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import GoTo, Plan, Step, describe, number_of
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason, TaskState
@@ -429,3 +432,60 @@ class PlanTransfer(Transfer):
             parts.submissions.gate.hold(accept, give_up, now=now)
 
         write_next(MavMissionResult.ACCEPTED, opaque_id=0, now=now)
+
+
+__all__ = ["MissionMessage", "MissionServers"]
+
+
+class MissionServers:
+    """The servers of the mission protocol at all addresses."""
+
+    def __init__(self, parts: MissionParts) -> None:
+        self._parts = parts
+        self._transfers: dict[tuple[int, Address, int], PlanTransfer] = {}
+
+    def apply(self, settings: Settings) -> None:
+        self._parts.settings = settings
+
+    def nonce_taken(self, taken: NonceTaken, *, now: float) -> None:
+        """Answer an upload with the task that the fleet had with its nonce."""
+        task = self._parts.registry.get(taken.task_id)
+        if task is not None and task.command == MavCmd.MISSION_START:
+            is_same = taken.payload == task.marks.payload
+            answer = taken.known if is_same else reused(task.marks.nonce)
+            self._transfer(None, self._parts.vehicles.our_address, MISSION).finish(answer, now=now)
+
+    def forget(self, vehicle: int) -> None:
+        """End the transfers of a vehicle's plans: clients begin again at its next gateway."""
+        for key in [each for each in self._transfers if each[0] == vehicle]:
+            self._parts.timers.forget(self._transfers.pop(key).timer)
+
+    def receive(
+        self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
+    ) -> bool:
+        """Handle a client's message. Return False if it is not for the server."""
+        vehicles, component = self._parts.vehicles, message.target_component
+        # most messages leave the vehicle as it is; the others mark it dirty
+        vehicle = vehicles.look_at(message.target_system)
+        if vehicle is None:
+            ours = vehicles.our_address
+            address = Address(message.target_system, component or ours.component_id)
+            is_ours = address == ours and isinstance(message, UploadMessage)
+        else:
+            address = Address(vehicle.system_id, component or AUTOPILOT)
+            is_claimed = address.component_id == AUTOPILOT and vehicle.parts.settings.claim
+            is_ours = is_claimed or address.component_id == vehicle.server_component
+        if is_ours:
+            kind = getattr(message, "mission_type", MISSION)
+            self._transfer(vehicle, address, kind).receive(client, packet, message, now=now)
+        return is_ours
+
+    def _transfer(self, vehicle: Vehicle | None, address: Address, kind: int) -> PlanTransfer:
+        """Return the transfers of plans of a type; those of an unknown one are not remembered."""
+        key = 0 if vehicle is None else vehicle.system_id, address, kind
+        transfer = self._transfers.get(key)
+        if transfer is None:
+            transfer = PlanTransfer(self._parts, vehicle, address, kind)
+            if kind in STORED:
+                self._transfers[key] = transfer
+        return transfer

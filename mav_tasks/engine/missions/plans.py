@@ -15,7 +15,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
-from mav_tasks.services.mission_item import count_of, unpacked
+from mav_tasks.services.missions import count_of, unpacked
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of

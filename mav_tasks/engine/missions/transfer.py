@@ -27,7 +27,7 @@ from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavMissionResult
-from mav_tasks.services.mission_item import (
+from mav_tasks.services.missions import (
     CAPACITY,
     Item,
     count_of,

@@ -27,8 +27,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import COPIED, DOUBLED
-from mav_tasks.services.command_sender import Standing
+from mav_tasks.services.commands import COPIED, DOUBLED, Standing
 from mav_tasks.services.persona import Persona
 from mav_tasks.services.vehicle_status import (
     HeartbeatMonitor,

@@ -15,10 +15,9 @@ from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import loss_failsafe, statustext
-from mav_tasks.services.command_sender import Answered, CommandSender, Standing
+from mav_tasks.services.commands import Answered, CommandSender, Standing
 from mav_tasks.services.interval_requester import IntervalRequester
-from mav_tasks.services.mission_item import Item
-from mav_tasks.services.mission_uploader import Done, MissionUploader
+from mav_tasks.services.missions import Done, Item, MissionUploader
 from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.orders import Phase, moves
 from mav_tasks.services.own_parameters import OwnParameters

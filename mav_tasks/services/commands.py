@@ -1,11 +1,15 @@
-"""Commands to one vehicle, ours and those of clients: one in flight for each command id.
+"""Commands and their answers: those of clients as values, and those under way to one vehicle.
 
-MAVLink guide, "Command Protocol". There is a lane for each (component, command id). An ack names
-neither the request nor the asker, so a second command of the same lane waits until the first is
-answered or given up, and for a while after it was given up a late ack is taken for the first one's
-and dropped. Urgent commands (disarm, HOLD) never wait; the answer to one is for all clients that
-ask for it. DEVIATION: our own repeats keep
-``confirmation`` 0, because a vehicle carries each copy out whatever it says.
+MAVLink guide, "Command Protocol". The very same packet of a client again is given the same answer
+(``engine/clients/sender.py``); which submissions are the same task is the task domain's to say
+(``tasks/deduplicator.py``).
+
+To a vehicle there is a lane for each (component, command id), with one command in flight. An ack
+names neither the request nor the asker, so a second command of the same lane waits until the first
+is answered or given up, and for a while after it was given up a late ack is taken for the first
+one's and dropped. Urgent commands (disarm, HOLD) never wait; the answer to one is for all clients
+that ask for it. DEVIATION: our own repeats keep ``confirmation`` 0, because a vehicle carries each
+copy out whatever it says.
 
 A lane is shared fairly: our own commands go first, then those of higher ranks, then those of
 clients that have fewer before them. Clients that ask for the same message share one request.
@@ -15,13 +19,63 @@ from bisect import insort
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Message
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.retry import Retry
+
+SAME_PACKET = 5.0  # s, the very same packet again: the same answer
+REPEATED = 2.5  # s in which a client repeats what it has no answer to, MAVSDK at 0.5, 1.0 and 1.5
+COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
+DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
+
+
+class Command(NamedTuple):
+    """COMMAND_LONG or COMMAND_INT, on one footing.
+
+    ``params`` are param1–param7; of a COMMAND_INT, 5 and 6 are its x and y as plain integers.
+    ``frame`` is None for a COMMAND_LONG.
+    """
+
+    target: Address
+    command: int
+    params: tuple[float, float, float, float, float, float, float]
+    confirmation: int
+    frame: int | None
+    message: CommandLong | CommandInt
+
+
+#: of a command that came in none, and to make one for each takes its time
+NO_MESSAGE = CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+def command_of(message: CommandLong | CommandInt) -> Command:
+    target = address_of(message.target_system, message.target_component)
+    first = (message.param1, message.param2, message.param3, message.param4)
+    if isinstance(message, CommandInt):
+        last = (float(message.x), float(message.y), message.z)
+        return Command(target, message.command, first + last, 0, message.frame, message)
+    last = (message.param5, message.param6, message.param7)
+    return Command(target, message.command, first + last, message.confirmation, None, message)
+
+
+def is_stop(message: Message | None) -> TypeGuard[CommandLong | CommandInt]:
+    """Whether a message stops a vehicle; that others have a field for a command means nothing."""
+    return isinstance(message, CommandLong | CommandInt) and message.command == MavCmd.TASK_STOP
+
+
+class Answer(NamedTuple):
+    """How a command was answered: everything of the ack but to whom."""
+
+    command: int
+    result: int
+    result_param2: int
+    source: Address
+    result_param1: int = 0  # the ack's field ``progress``
+
 
 REPEAT = 0.25  # s, between our own repeats
 LATE = 0.4  # s, during which acks of a command given up are still expected
