@@ -382,9 +382,9 @@ class VehicleTasks(Lineup):
 
     def _look_at_released(self, seen: VehicleView, *, now: float) -> None:
         """Start a released task once nothing blocks it; hold it as before if it cannot start."""
-        release, task = self.released, self.active
-        if release is None:
+        if (release := self.released) is None:
             return
+        task = self.active
         if task is None or task.id != release.task_id or task.state is not S.HELD:
             self.release_permit.end()
             return
@@ -438,17 +438,17 @@ class VehicleTasks(Lineup):
                 return view.HALT
             self.stopping_after_kill = False
         self._look_at_released(seen, now=now)
-        before = self.active
-        demand = self.executor.step(seen, now=now)
+        before, executor = self.active, self.executor
+        demand = executor.step(seen, now=now)
         if before is not None:
             self._note_step(before, now=now)
-        if self.active is not None and not self.is_interrupted(seen, now=now):
+        if executor.task_id is not None and not self.is_interrupted(seen, now=now):
             return demand
         self.begin_next(seen, now=now)
-        if self.active is not None:  # the refusal was for the task before
+        if executor.task_id is not None:  # the refusal was for the task before
             if not self.paused:  # the person who halted it has not paused its queue
                 self.halts.by_somebody = NOBODY
-            return self.executor.step(replace(seen, refusal=R.NONE), now=now)
+            return executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
 
     def _note_step(self, before: Task, *, now: float) -> None:

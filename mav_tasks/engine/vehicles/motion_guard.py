@@ -132,13 +132,13 @@ class MotionGuard:
         parts, control, asked = self._parts, self._parts.control, demand.velocity
         moved, active = self._displacement(now=now), parts.tasks.active
         speed = None if moved is None else moved[0]
-        found = []
-        may_drive = control.in_control and not parts.tasks.is_stopped
+        found, in_control = [], control.in_control
+        may_drive = in_control and not parts.tasks.is_stopped
         words = self._why_too_fast(asked.forward, speed, now=now) if may_drive else ""
         if words and active is not None and active.state is TaskState.EXECUTING:
             found.append(Seen(Event.TOO_FAST, TaskReason.OVERSPEED, words))
-        is_ours = control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING)
-        if control.in_control and not asked.is_zero:
+        is_ours = in_control or control.phase in (Phase.RELEASING, Phase.STOPPING)
+        if in_control and not asked.is_zero:
             self.told_to_move(now=now)
             self.step = Step.OFF
         elif is_ours and parts.monitor.armed and not seen.still:

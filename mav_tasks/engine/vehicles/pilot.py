@@ -85,14 +85,14 @@ class Pilot:
     def follow(self, *, now: float) -> list[Seen]:
         """Run the tasks and carry out their demand. Return the findings; call ``send`` next."""
         parts = self._parts
-        tasks = parts.tasks
+        tasks, executor = parts.tasks, parts.tasks.executor
         self._face(now=now)
         seen = self._view(now)
-        begun_before = tasks.active
+        begun_before = executor.task_id
         demand = STOP if self._is_closing else tasks.step(seen, now=now)
-        self._is_back_home = self._is_back_home and tasks.active is None
-        if begun_before is not None and tasks.active is None:
-            ended = parts.registry[begun_before.id]
+        self._is_back_home = self._is_back_home and executor.task_id is None
+        if begun_before is not None and executor.task_id is None:
+            ended = parts.registry[begun_before]
             parts.authority.revoke()
             self._note_end(ended)
             if ended.reason is TaskReason.STUCK:
@@ -109,8 +109,9 @@ class Pilot:
 
     def plan_tick(self, *, now: float) -> None:
         """Plan the next tick if there is anything to drive or to watch."""
-        is_engaged = self._parts.control.is_engaged
-        if is_engaged or self._parts.tasks.active is not None or self.guard.is_on:
+        parts = self._parts
+        is_begun = parts.tasks.executor.task_id is not None
+        if is_begun or parts.control.is_engaged or self.guard.is_on:
             self.clock.plan(now=now)
         else:
             self.clock.stop()
