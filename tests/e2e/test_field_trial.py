@@ -27,7 +27,7 @@ def test_the_trial_restarts_the_server_in_mid_move_and_prints_the_table(tmp_path
     (port,) = free_udp_ports(1)
     truth = tmp_path / "truth.csv"
     with process(*rover(port, truth), folder=tmp_path, name="rover") as body:
-        body.wait_for("rover")
+        body.wait_for(" on udp")
         with process(*trial(port, truth, "--only", ROWS), folder=tmp_path, name="trial") as run:
             run.wait_for(r"restart +orderly restart .*\n", within=90)
             assert run.popen.wait(10) in (0, 1), run.text
@@ -41,7 +41,7 @@ def test_ctrl_c_stops_the_rover_and_ends_the_server(tmp_path: Path) -> None:
     truth, kept = tmp_path / "truth.csv", tmp_path / "kept"
     more = ("--only", ROWS, "--keep", str(kept))
     with process(*rover(port, truth), folder=tmp_path, name="rover") as body:
-        body.wait_for("rover")
+        body.wait_for(" on udp")
         with process(*trial(port, truth, *more), folder=tmp_path, name="trial") as run:
             run.wait_for(r"\nrestart:")
             log = kept / "server.log"
