@@ -56,7 +56,7 @@ DO_CHANGE_SPEED 1 -1 : ACCEPTED
 MISSION_START 0 3 : DENIED param2 last item 3: only the whole plan can run
 MISSION_START : DENIED there is no mission: upload one first
 DO_SET_MISSION_CURRENT 1 : DENIED there is no mission: upload one first
-TASK_MOVE 1 0 0 0 0 60 : ACCEPTED Task 1
+TASK_MOVE 1 0 0 0 0 60 : ACCEPTED #1
 TASK_CANCEL 9 : DENIED no task 9
 TASK_CANCEL 9 confirmation=1 : DENIED just refused; send it again if you mean it
 TASK_CANCEL 8 confirmation=1 : DENIED no task 8
@@ -66,7 +66,7 @@ TASK_MODIFY 1 8 0 0 99 : DENIED LABEL must be sent as COMMAND_INT
 TASK_MODIFY 1 8 3 0 x=-1 y=-1 : DENIED label: byte 3 comes after byte 0
 TASK_MODIFY 1 9 60 : ACCEPTED
 TASK_MODIFY 1 9 60 0 0 0 1 : ACCEPTED
-mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED Task 2
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED #2
 TASK_MODIFY 2 9 60 : DENIED task 2 needs a start command: it cannot repeat
 ARM 1 : ACCEPTED
 fault refuse_arm=1 : -
@@ -124,8 +124,8 @@ rally; NAV_WAYPOINT at=1,1 : UNSUPPORTED rally points
 plan; NAV_WAYPOINT at=1,1 frame=99 : UNSUPPORTED_FRAME item 1: frame 99 is unknown
 plan; TASK_MOVE 1 x=9 : INVALID_PARAM5_X param5 run after: not in a plan
 plan; JUMP_TAG 5; DO_JUMP_TAG 5 2 : INVALID a loop without motion
-plan; NAV_WAYPOINT x=2147483647; NAV_LOITER_TURNS 1 0 1 : ACCEPTED Task 1
-mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0; DO_SET_SERVO 1 frame=2 : ACCEPTED Task 2
+plan; NAV_WAYPOINT x=2147483647; NAV_LOITER_TURNS 1 0 1 : ACCEPTED #1
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0; DO_SET_SERVO 1 frame=2 : ACCEPTED #2
 mission_request_list 0 : - MISSION_COUNT@1
 mission_request 2 : - MISSION_ITEM@1
 wait 40 & mission_request_list 0 : - MISSION_COUNT@1
@@ -167,9 +167,9 @@ rover:gps_global_origin 910000000 0 0 : -
 rover:rc_channels 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 : -
 rover:param_value SERVO1_FUNCTION nan 9 1 1 : -
 rover:autopilot_version 0 0 0 0 0 EIGHT EIGHT EIGHT 0 0 1 : -
-TASK_MOVE 0.2 : ACCEPTED Task 1
+TASK_MOVE 0.2 : ACCEPTED #1
 wait 4 : - Task 1 done
-TASK_MOVE 9 : ACCEPTED Task 2
+TASK_MOVE 9 : ACCEPTED #2
 wait 2 & ARM 0 21196 to=autopilot : ACCEPTED Task 2 stopped for good
 MANY_TEXTS : - 0000000041
 """,
@@ -177,13 +177,13 @@ MANY_TEXTS : - 0000000041
         (
             {},
             """
-mission; NAV_WAYPOINT; NAV_WAYPOINT at=0.2,0; NAV_WAYPOINT at=0.3,0 : ACCEPTED Task 1
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=0.2,0; NAV_WAYPOINT at=0.3,0 : ACCEPTED #1
 MISSION_START 2 : ACCEPTED
 mission : DENIED task 1 has started: cancel it first
 wait 8 : - Task 1 done
 mission_set_current 1 : - The mission will start with item 1
 DO_SET_MISSION_CURRENT 1 : ACCEPTED The mission will start with item 1
-plan; NAV_WAYPOINT 60 x=2147483647 : ACCEPTED Task 2
+plan; NAV_WAYPOINT 60 x=2147483647 : ACCEPTED #2
 MISSION_START : ACCEPTED
 wait 1 : -
 fault position_jump=50,0 : -
@@ -193,7 +193,7 @@ fault : -
 wait 1 : -
 TASK_RELEASE 2 2 : ACCEPTED
 TASK_RELEASE 2 2 : ACCEPTED task 2: already skipped
-DO_SET_MODE 1 11 to=autopilot : ACCEPTED Task 3
+DO_SET_MODE 1 11 to=autopilot : ACCEPTED #3
 DO_SET_MODE 1 11 to=autopilot : ACCEPTED
 """,
         ),
@@ -202,7 +202,7 @@ DO_SET_MODE 1 11 to=autopilot : ACCEPTED
             """
 TASK_DRIVE 0 20 1 : DENIED param2 yaw rate: rover 1 steers like a car
 NAV_SET_YAW_SPEED 90 0 : DENIED param2 speed 0: rover 1 steers like a car
-TASK_MOVE 0.3 : ACCEPTED Task 1
+TASK_MOVE 0.3 : ACCEPTED #1
 wait 5 : - Task 1 done
 """,
         ),
@@ -241,7 +241,7 @@ wait 2 : - GPS_RAW_INT@1
         (
             {"persona": replace(PROMPT_PX4, autopilot=MavAutopilot.GENERIC)},
             """
-TASK_MOVE 4 : ACCEPTED Task 1
+TASK_MOVE 4 : ACCEPTED #1
 wait 3 : -
 fault refuse_mode=1 & TASK_STOP : ACCEPTED
 wait 4 : - Disarmed
@@ -289,12 +289,12 @@ wait 6 : -
         (
             {},
             """
-lose 77 & TASK_MOVE 0.5 : ACCEPTED Task 1
+lose 77 & TASK_MOVE 0.5 : ACCEPTED #1
 wait 8 : - Task 1 done
-lose 200 & TASK_MOVE 0.5 : ACCEPTED Task 2
+lose 200 & TASK_MOVE 0.5 : ACCEPTED #2
 wait 2 & fault refuse_mode=1 & wait 8 : - Task 2 done
 fault : -
-TASK_MOVE 9 : ACCEPTED Task 3
+TASK_MOVE 9 : ACCEPTED #3
 wait 2 & operator rtl & wait 1 : - Task 3
 rover:statustext 4 LONG 7 0 & rover:statustext 4 LONGER 7 0 : - failsafe: Failsafexxxx / x[?]
 """,
@@ -307,7 +307,7 @@ NAV_WAYPOINT at=0.3,0 frame=0 & wait 7 : ACCEPTED Task 1 done
 fault withheld=33,49,242 & reboot & wait 12 : - Rover 1 restarted
 NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED Task 2 waits: no valid position
 REQUEST_MESSAGE 54000 2 & TASK_CANCEL 2 : ACCEPTED+ACCEPTED
-plan; GO x=30000 y=0 frame=1; GO at=6,0; GO at=7,0 : ACCEPTED Task 3
+plan; GO x=30000 y=0 frame=1; GO at=6,0; GO at=7,0 : ACCEPTED #3
 wait 12 : - Task 3 paused: position lost
 fault & wait 15 : - Task 3 done
 """,
@@ -350,12 +350,12 @@ ARM 1 : ACCEPTED
         (
             {},
             """
-TASK_MOVE 9 : ACCEPTED Task 1
+TASK_MOVE 9 : ACCEPTED #1
 wait 3 & fault position_jump=50,0 & wait 1 : - Task 1 held: position reference changed
 TASK_MOVE 1 to=any : BUSY no rover can: rover 1: a task is held
 fault & wait 5 : -
 DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED
-CLICK at=5,0 frame=0 : ACCEPTED Task 2 starts now
+CLICK at=5,0 frame=0 : ACCEPTED #2
 TASK_RELEASE 1 0 : DENIED task 2 is executing: release task 1 later
 TASK_MOVE 1 : ACCEPTED Task 3 waits, press Continue
 REQUEST_MESSAGE 54000 3 : ACCEPTED
@@ -364,7 +364,7 @@ TASK_RELEASE 1 0 : ACCEPTED Task 1 waits: released
 DO_PAUSE_CONTINUE 1 & wait 3 : ACCEPTED task 1 is next
 fault position_jump=50,0 & wait 1 : - Task 1 held / Task 2 held
 fault & wait 5 & DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED
-CLICK at=6,0 frame=0 : ACCEPTED Task 4 starts now
+CLICK at=6,0 frame=0 : ACCEPTED #4
 TASK_STOP : ACCEPTED Task 4 stopped for good
 wait 5 & TASK_RELEASE 1 0 : BUSY STOP is in force: press Continue first
 TASK_CANCEL 1 : ACCEPTED Task 1 cancelled
@@ -374,14 +374,14 @@ TASK_CANCEL 1 : ACCEPTED Task 1 cancelled
             {},
             """
 fault refuse_arm=1 : -
-TASK_MOVE 1 : ACCEPTED Task 1
+TASK_MOVE 1 : ACCEPTED #1
 DO_CHANGE_SPEED 1 0.3 : ACCEPTED
 wait 1 & fault refuse_arm=1 position_jump=50,0 & wait 2 : - not ready to arm
 fault & wait 9 : - Task 1 done
 DO_SET_MODE 1 11 to=autopilot & wait 3 & DO_PAUSE_CONTINUE 0 : ACCEPTED+ACCEPTED Task 2 paused
 wait 5 & DO_PAUSE_CONTINUE 1 : ACCEPTED task 2 is next, return home
 wait 9 : - Task 2 done
-plan; GO at=1,0; NAV_SET_YAW_SPEED 45 0.5 : ACCEPTED Task 3
+plan; GO at=1,0; NAV_SET_YAW_SPEED 45 0.5 : ACCEPTED #3
 wait 7 & DO_CHANGE_SPEED 1 0.4 : ACCEPTED
 TASK_CANCEL 0 & TASK_MOVE 1 to=any : ACCEPTED+ACCEPTED Rover 1 chosen: free in
 wait 9 : - Task 3 cancelled / Task 4 done
@@ -393,18 +393,18 @@ TASK_RELEASE 5 1 : DENIED the position reference of task 5 is lost
         (
             {},
             """
-TASK_MOVE 1 0 0 0 0 60 : ACCEPTED Task 1
-TASK_MOVE 2 0 0 0 1 10 : ACCEPTED Task 2
+TASK_MOVE 1 0 0 0 0 60 : ACCEPTED #1
+TASK_MOVE 2 0 0 0 1 10 : ACCEPTED #2
 TASK_MOVE 0.3 to=any & wait 4 : ACCEPTED Rover 1 chosen: free
 DO_PAUSE_CONTINUE 0 : ACCEPTED
-TASK_MOVE 3 : ACCEPTED Task 4
-TASK_MOVE 2 0 0 0 4 : ACCEPTED Task 5
+TASK_MOVE 3 : ACCEPTED #4
+TASK_MOVE 2 0 0 0 4 : ACCEPTED #5
 TASK_MODIFY 4 3 12 & TASK_MODIFY 5 3 13 : ACCEPTED+ACCEPTED
 sleep 20 : - Task 4 expired: deadline / Task 5 failed: dependency failed
-NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED Task 6
+NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED #6
 NAV_WAYPOINT x=10000 y=0 frame=1 : ACCEPTED repeated goal, no new task: see task 6
-NAV_WAYPOINT 1 x=10000 y=1 frame=1 : ACCEPTED Task 7
-NAV_WAYPOINT x=10000 y=1 frame=1 : ACCEPTED Task 8
+NAV_WAYPOINT 1 x=10000 y=1 frame=1 : ACCEPTED #7
+NAV_WAYPOINT x=10000 y=1 frame=1 : ACCEPTED #8
 TASK_MOVE 1.1 & TASK_MOVE 1.2 & TASK_MOVE 1.3 : ACCEPTED+ACCEPTED+ACCEPTED
 TASK_MOVE 2.1 & TASK_MOVE 2.2 & TASK_MOVE 2.3 : ACCEPTED+ACCEPTED+ACCEPTED
 TASK_MOVE 3.1 & TASK_MOVE 3.2 & TASK_MOVE 3.3 : ACCEPTED+ACCEPTED+ACCEPTED
@@ -432,7 +432,7 @@ fault & wait 2 : - LOCAL_POSITION_NED@1
         (
             {},
             """
-operator rtl & wait 1 & TASK_MOVE 2 : ACCEPTED Task 1
+operator rtl & wait 1 & TASK_MOVE 2 : ACCEPTED #1
 TASK_MODIFY 1 3 2 : ACCEPTED
 sleep 5 : - Task 1 expired: deadline
 operator hold & wait 4 & ARM 1 & wait 1 & DO_SET_MODE 1 15 to=autopilot : ACCEPTED+ACCEPTED
@@ -444,12 +444,12 @@ operator manual & wait 4 & TASK_MOVE 1 to=any : BUSY no rover can: rover 1: wron
         (
             {},
             """
-plan; GO at=1,0; GO at=2,0; GO at=2,4; GO at=2,8 : ACCEPTED Task 1
+plan; GO at=1,0; GO at=2,0; GO at=2,4; GO at=2,8 : ACCEPTED #1
 wait 2 : -
 fence; POND 4 at=1.5,5; POND 4 at=2.5,5; POND 4 at=2.5,6; POND 4 at=1.5,6 : ACCEPTED
 wait 22 : - would leave the fence in task 1 / Task 1 held: stopped at the fence
-TASK_CANCEL 1 & wait 2 & CLICK at=0,0 frame=0 : ACCEPTED+ACCEPTED Task 2
-CLICK at=0,9 frame=0 : ACCEPTED Task 3
+TASK_CANCEL 1 & wait 2 & CLICK at=0,0 frame=0 : ACCEPTED+ACCEPTED #2
+CLICK at=0,9 frame=0 : ACCEPTED #3
 TASK_STOP : ACCEPTED Task 2 stopped for good / Task 3 stopped for good
 wait 4 & DO_PAUSE_CONTINUE 1 & TASK_MOVE -4 & wait 3 : ACCEPTED+ACCEPTED Task 4 started
 TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED Task 4 cancelled / Rover 1 restarted
@@ -464,10 +464,10 @@ TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED Task 4 cancelled / Rover 1 restarted
                 )
             },
             """
-fault refuse_mode=1 withheld=30,32 & TASK_MOVE 0.1 & wait 0.4 & BLIND & wait 2 : ACCEPTED Task 1
+fault refuse_mode=1 withheld=30,32 & TASK_MOVE 0.1 & wait 0.4 & BLIND & wait 2 : ACCEPTED #1
 fault & wait 9 : - Task 1 done
-TASK_MOVE -4 : ACCEPTED Task 2
-NAV_WAYPOINT at=3,0 frame=0 : ACCEPTED Task 3
+TASK_MOVE -4 : ACCEPTED #2
+NAV_WAYPOINT at=3,0 frame=0 : ACCEPTED #3
 TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue full
 wait 15 : - Task 2 done / Task 3 failed: bad parameter
 lose 0 & TASK_MOVE 4 & wait 3 : ACCEPTED Task 4 failed: start timeout
@@ -479,9 +479,9 @@ lose 0 & TASK_MOVE 4 & wait 3 : ACCEPTED Task 4 failed: start timeout
                 "settings": Settings(watch=Watch(ready_timeout=5), queueing=Queueing(capacity=1)),
             },
             """
-mission; GO at=0.3,0 & wait 1 : ACCEPTED Task 1
+mission; GO at=0.3,0 & wait 1 : ACCEPTED #1
 DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 9 : ACCEPTED+ACCEPTED Task 1 done
-ARM 0 & wait 5 & TASK_MOVE 1 0 0 0 0 60 : ACCEPTED+ACCEPTED Task 2
+ARM 0 & wait 5 & TASK_MOVE 1 0 0 0 0 60 : ACCEPTED+ACCEPTED #2
 DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 1 : ACCEPTED+ACCEPTED queue full: 1
 TASK_CANCEL 2 & ARM 0 & wait 5 & DO_PAUSE_CONTINUE 1 : ACCEPTED+ACCEPTED+ACCEPTED
 fault refuse_arm=1 : -
@@ -493,7 +493,7 @@ fault & wait 9 : - Task 3 failed: loss failsafe
         (
             {"persona": PROMPT_PX4, "settings": Settings(yaw_rate="honoured")},
             """
-TASK_ROTATE 10 : ACCEPTED Task 1
+TASK_ROTATE 10 : ACCEPTED #1
 wait 5 : - Task 1 failed: stuck
 """,
         ),
@@ -555,19 +555,19 @@ def test_a_flood_of_refusals_is_answered_and_not_told(world: World) -> None:
     "table",
     [
         """
-TASK_ROTATE 270 & wait 4 : ACCEPTED Task 1
+TASK_ROTATE 270 & wait 4 : ACCEPTED #1
 RESTART
 wait 4 & TASK_RELEASE 1 1 : DENIED the progress of task 1 is unknown
 fault silent=1 & wait 5 & TASK_RELEASE 1 0 : ACCEPTED Task 1 waits: the rover is silent
 wait 25 : - holds task 1 again: waited too long (rover silent). Release it again
 """,
         """
-TASK_MOVE 9 & wait 3 : ACCEPTED Task 1
+TASK_MOVE 9 & wait 3 : ACCEPTED #1
 RESTART
 fault position_jump=0,3 & wait 6 & TASK_RELEASE 1 1 : DENIED the rover is off the path of task 1
 """,
         """
-TASK_MOVE 3 0 0 0 0 0 1 & wait 3 : ACCEPTED Task 1
+TASK_MOVE 3 0 0 0 0 0 1 & wait 3 : ACCEPTED #1
 TASK_MOVE -1 0 0 0 0 0 9 & wait 2 & reboot : ACCEPTED Task 1 paused: preempted
 RESTART
 wait 9 & TASK_CANCEL 2 : ACCEPTED
@@ -591,7 +591,7 @@ TASK_MOVE 2 confirmation=1 : ACCEPTED #2
 TASK_MOVE 4 : ACCEPTED #3
 """,
         """
-TASK_MOVE 2 & wait 3 : ACCEPTED Task 1
+TASK_MOVE 2 & wait 3 : ACCEPTED #1
 RESTART
 wait 4 & DO_PAUSE_CONTINUE 1 : ACCEPTED #0 / keeps task 1 on hold: press
 wait 3 & DO_PAUSE_CONTINUE 1 : DENIED #112 / task 1 is held / release it (again
