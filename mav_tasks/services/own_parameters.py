@@ -77,7 +77,7 @@ class OwnParameters:
         self._look()
 
     def _look(self) -> None:
-        """Look anew at how it stops: this is asked for with each set-point."""
+        """Update what follows from the values; each set-point reads it."""
         #: see ``loss_failsafe.fault_in``
         self.fault = loss.fault_in(self.values)
         #: whether it is being asked how it stops, and nobody knows that yet

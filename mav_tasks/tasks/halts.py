@@ -145,7 +145,7 @@ class Permit(Generic[T]):
 
     def __init__(self, halts: Halts) -> None:
         self._halts = halts
-        #: whoever got it last, None after ``end``; ``holder`` says whether it counts still
+        #: who got it last; None after ``end``. Only ``holder`` says whether it has ended by itself
         self.given: T | None = None
         self._term, self._until = -1, -inf
 

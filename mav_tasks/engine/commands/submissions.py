@@ -282,8 +282,8 @@ class Submissions:
     def _accept(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         """Acknowledge a durable submission with the task's id, and tell all clients.
 
-        It is a warning to a station that must press a button. A client that reads TASK_STATUS is
-        not told of its own task what that and the acknowledgement say.
+        It is a warning to a station that must press a button. A client that reads TASK_STATUS gets
+        no text that its own task is queued: the acknowledgement and that message say so.
         """
         if task.id not in self._undecided:
             return  # retracted, and answered

@@ -9,7 +9,8 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.packets import LeaseWatch
 from mav_tasks.engine.vehicles.authority import Armings, Authority
-from mav_tasks.engine.vehicles.shown import OwnFailsafes, ShownHeartbeat, StickWatch
+from mav_tasks.engine.vehicles.own_failsafes import OwnFailsafes
+from mav_tasks.engine.vehicles.shown import ShownHeartbeat, StickWatch
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
 from mav_tasks.errors import Rejection

@@ -68,7 +68,7 @@ class SenderClock:
         self._least = inf  # of all buckets
         self._exchanges: deque[tuple[float, float]] = deque()  # (end, lower bound of the offset)
         self._quickest = inf  # s, round trip of the quickest exchange so far
-        #: when the vehicle booted as of the last news, and when that news was sent: by our clock, s
+        #: s by our clock: when the vehicle booted, by the last news, and when that news was sent
         self.booted = self.news_at = inf
 
     def __repr__(self) -> str:
@@ -160,6 +160,6 @@ class SenderClock:
 
 
 def _made_at(ms: int, booted_at: float, *, now: float) -> float:
-    """Return when a message of that time stamp was made; ``now`` if it is so by its precision."""
+    """Return when a message of that time stamp was made; ``now`` if ROUNDING may be all."""
     made_at = ms / 1000 + booted_at
     return now if now - made_at < ROUNDING else made_at

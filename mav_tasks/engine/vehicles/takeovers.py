@@ -12,8 +12,8 @@ from mav_tasks.engine.vehicles.authority import SHOWN_LATE, Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.joint_control import BUTTONS, JointControl, Word
 from mav_tasks.engine.vehicles.motion_guard import NEARLY_STANDS
+from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts
-from mav_tasks.engine.vehicles.shown import News
 from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason
 

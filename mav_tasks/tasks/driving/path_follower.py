@@ -36,7 +36,7 @@ class PathFollower:
     steering: Steering | None = None
     #: how often a place was missed and driven to again
     misses: int = 0
-    #: the current leg, and what it follows from
+    #: the current leg, which each set-point reads several times, and what it follows from
     _leg: Leg | None = None
     _leg_of: tuple[object, ...] = ()
 
