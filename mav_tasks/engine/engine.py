@@ -365,6 +365,9 @@ class Engine:
 
         The order is otherwise kept.
         """
+        rows = [each.row.kind for each in received]
+        if Kind.HALT not in rows and Kind.GO not in rows:  # HOLD has the row of all modes
+            return received
         kinds = [self._kind_of(each) for each in received]
         if Kind.HALT not in kinds:
             return received
@@ -381,7 +384,7 @@ class Engine:
         if vehicle is None:
             return Kind.WISH
         if command is not None:
-            return kind_of(command, received.row, vehicle.persona)
+            return kind_of(command, received.row, vehicle)
         if isinstance(message, m.SetMode):
             is_hold = message.custom_mode == vehicle.persona.hold_mode
             return Kind.HALT if is_hold else Kind.GO

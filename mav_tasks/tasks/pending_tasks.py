@@ -132,7 +132,7 @@ class PendingTasks:
         task = self._registry.submit(draft, state=state, now=now)
         self._enter(task, now=now)
         if state is S.QUEUED:  # wakes nobody: it is not durable yet
-            self._line_up(task)
+            self._queues[task.vehicle].put(self._entry(task))
         return task
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
@@ -183,14 +183,11 @@ class PendingTasks:
         if task.state is not wanted:
             task = self._registry.change(task.id, wanted, now=now)
         if wanted is S.QUEUED:
-            self._line_up(task)
+            self._queues[task.vehicle].put(self._entry(task))
             self.woken.add(task.vehicle)
         else:
             self._queues[task.vehicle].discard(task.id)
         return task
-
-    def _line_up(self, task: Task) -> None:
-        self._queues[task.vehicle].put(self._entry(task))
 
     def _entry(self, task: Task) -> Entry:
         rank = self._waiters[task.id].rank
@@ -255,7 +252,7 @@ class PendingTasks:
         self.woken |= {task.vehicle, vehicle}
         task = self._registry.assign(task.id, vehicle, choice=choice, now=now)
         if is_ready:
-            self._line_up(task)
+            self._queues[task.vehicle].put(self._entry(task))
 
     # series
 
@@ -527,5 +524,5 @@ class PendingTasks:
             waiter.rank = rank
             task = self._registry[seen]
             if seen in self._queues[task.vehicle]:
-                self._line_up(task)
+                self._queues[task.vehicle].put(self._entry(task))
             seen = TaskId(task.terms.after)

@@ -75,21 +75,23 @@ class Rights(NamedTuple):
 
     def check_terms(self, terms: Terms, before: Terms = UNASKED) -> None:
         """Raise Rejection if terms, of a new task or in place of others, are not allowed."""
-        most, standing = self.limits.max_priority, terms.standing
-        if standing > most and standing > before.standing:
-            raise self.refusal(f"may use priority {most} at most, not {standing}")
+        most = self.limits.max_priority
+        if most < NO_LIMIT.max_priority and terms.standing > max(most, before.standing):
+            raise self.refusal(f"may use priority {most} at most, not {terms.standing}")
         if terms.is_preemptive > before.is_preemptive:
             self.require(OPERATOR, "make a task pre-emptive")
 
-    def checked(self, draft: Draft, *, waiting: int, known: Callable[[], Known]) -> Draft:
+    def checked(
+        self, draft: Draft, *, waiting: Callable[[], int], known: Callable[[], Known]
+    ) -> Draft:
         """Return the draft, bounded to the client's limits; raise Rejection if it is not allowed.
 
-        ``waiting``: how many tasks of its submitter wait already. ``known``: from where its rover
-        will drive it, as far as that can be told.
+        ``waiting``: returns how many tasks of its submitter wait already. ``known``: from where
+        its rover will drive it, as far as that can be told.
         """
         self.check_content(draft)
         limits = self.limits
-        if waiting >= limits.quota:
+        if limits.quota < NO_LIMIT.quota and waiting() >= limits.quota:
             raise self.refusal(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
         top, most = limits.max_speed, limits.max_distance
         is_far = most >= NO_LIMIT.max_distance

@@ -22,7 +22,6 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.commands import NO_MESSAGE, REPEATED, Answer, Command
-from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Marks, Submitter
@@ -47,14 +46,15 @@ def row_said(command: Command) -> Row:
     return COMMANDS.get(command.command) or row_of_command(command.command)
 
 
-def kind_of(command: Command, row: Row, persona: Persona) -> Kind:
+def kind_of(command: Command, row: Row, vehicle: Vehicle) -> Kind:
     """Return the kind of a command with this row; HOLD is a HALT, any other mode a GO."""
     if command.command != SET_MODE:
         return row.kind
+    persona = vehicle.parts.persona
     return Kind.HALT if persona.mode_in(*command.params[1:3]) == persona.hold_mode else Kind.GO
 
 
-def halts_again(command: Command, persona: Persona, *, after: float) -> bool:
+def halts_again(command: Command, vehicle: Vehicle, *, after: float) -> bool:
     """Whether a command is executed again when the same packet comes ``after`` so many seconds.
 
     Every halt is: some senders do not count their packets, so it may be a new command. TASK_CANCEL
@@ -64,7 +64,7 @@ def halts_again(command: Command, persona: Persona, *, after: float) -> bool:
     if command.command in OF_ONE_TASK:
         is_by_id = command.command == MavCmd.TASK_CANCEL and command.params[0] != 0.0
         return after > REPEATED and not is_by_id
-    return kind_of(command, row_said(command), persona) is Kind.HALT
+    return kind_of(command, row_said(command), vehicle) is Kind.HALT
 
 
 class CommandRequest:
@@ -94,7 +94,7 @@ class CommandRequest:
         if vehicle is not None:
             self.vehicle = vehicle
             if command.command == SET_MODE:
-                self.kind = kind_of(command, row, vehicle.parts.persona)
+                self.kind = kind_of(command, row, vehicle)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.command}, by {self.submitter})"

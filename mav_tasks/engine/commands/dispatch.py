@@ -74,7 +74,7 @@ class Commands:
             return
         sender = client.sender(packet.source)
         known = sender.same_packet(packet.raw, now=now)
-        if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
+        if known is not None and not halts_again(command, vehicle, after=now - known.at):
             if known.answer is not None and not known.is_held:
                 client.answer(known.answer, packet.source)
             return

@@ -220,7 +220,7 @@ class Submissions:
         self.check_open()
         if runs_now:
             rights.require(OPERATOR, "run a task immediately")
-        waiting = vehicle.tasks.count_of(draft.submitter)
+        waiting = partial(vehicle.tasks.count_of, draft.submitter)
         known = partial(known_when_empty, vehicle.tasks, self._registry, now=now)
         draft = rights.checked(draft, waiting=waiting, known=known)
         if ends_driving_of is not None:
@@ -292,9 +292,11 @@ class Submissions:
         tasks, own, reads = asked.vehicle.tasks, asked.client, asked.client.uses_dialect
         is_blocked = tasks.immediate != task.id and bool(tasks.paused or tasks.is_held_ahead)
         knows = reads and not is_blocked and not task.choice
-        told = [client for client in self._gcs.clients if client is not own or not knows]
-        words = accepted_words(asked, task) if told else ""
-        for client in told:
+        words = ""
+        for client in self._gcs.clients:
+            if client is own and knows:
+                continue
+            words = words or accepted_words(asked, task)
             must_act = is_blocked and client is own and not reads
             severity = MavSeverity.WARNING if must_act else MavSeverity.INFO
             client.tell(words, severity, asked.vehicle.server_address, now=now)
