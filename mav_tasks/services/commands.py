@@ -267,8 +267,10 @@ class CommandSender:
         if lane.in_flight is None:
             self._take_late(lane, ack, now=now)
             return
-        if not self._is_meant(ack, lane.in_flight):
-            return
+        packet = lane.in_flight.packet
+        asker = self._source if packet is None else packet.source
+        if not Address(ack.target_system, ack.target_component).reaches(asker):
+            return  # others may command the vehicle by another way
         if lane.owed and now < lane.owed_until:  # the answer to what was pushed aside comes first
             lane.owed -= 1
             return
@@ -331,11 +333,6 @@ class CommandSender:
             if not lane.late:
                 lane.quiet_until = now
                 self._advance(lane, now=now)
-
-    def _is_meant(self, ack: CommandAck, request: _Request) -> bool:
-        """Whether an ack is for who asked; others may command the vehicle by another way."""
-        asker = self._source if request.packet is None else request.packet.source
-        return Address(ack.target_system, ack.target_component).reaches(asker)
 
     def _enqueue(self, request: _Request, *, now: float) -> None:
         if len(self._lanes) > KEPT_LANES:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from mav_tasks.tasks.cron import utc_text
 from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-from mav_tasks.tasks.repetition import repeat_words
 from mav_tasks.tasks.task import Frame, Progress, Task, TaskId, Terms
 from mav_tasks.tasks.timing import Timing
 
@@ -510,7 +509,8 @@ def _changes(before: Terms, after: Terms, at: float) -> Iterator[str]:
         if getattr(after, term) != getattr(before, term):
             yield yes if getattr(after, term) else no
     if after.repeat != before.repeat:
-        yield f"repeats: {repeat_words(after.repeat)}" if after.repeat else "does not repeat"
+        every = f"every {after.repeat} s" if after.repeat.isdigit() else after.repeat
+        yield f"repeats: {every}" if every else "does not repeat"
     if after.label != before.label:
         yield f"label '{after.label}'" if after.label else "no label"
 

@@ -177,13 +177,15 @@ class TaskRegistry:
         old = self._tasks[task_id]
         check_transition(old.state, new)
         timing = timing or old.timing
+        if timing is not None and new in TERMINAL:
+            timing = replace(timing, spread=())
         task = replace(
             old,
             state=new,
             reason=reason,
             version=old.version + 1,
             progress=old.progress if progress is None else progress,
-            timing=timing.final if timing and new in TERMINAL else timing,
+            timing=timing,
             changed_at=now,
         )
         self._tasks[task_id] = task

@@ -50,11 +50,6 @@ def canonical(text: str) -> str:
     return str(rule_of(text))
 
 
-def repeat_words(text: str) -> str:
-    """Return a repetition as text for people: "every 3600 s"."""
-    return f"every {text} s" if text.isdigit() else text
-
-
 def why_series_ends(task: Task) -> str:
     """Return why no run follows a task that has ended, in words; "": one follows.
 

@@ -7,7 +7,7 @@ counts: no interval spans a pause.
 """
 
 from bisect import bisect_left
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import accumulate
 from math import ceil
 
@@ -52,11 +52,6 @@ class Timing:
             f" p99 {self.p99 * 1e3:.1f}, max {self.longest * 1e3:.1f} ms, {self.late} late"
         )
 
-    @property
-    def final(self) -> "Timing":
-        """Timing of a finished task: without the histogram."""
-        return replace(self, spread=())
-
 
 class TimingMeter:
     """Meter of one task's intervals. Its memory is bounded, however long the task drives."""
@@ -86,9 +81,11 @@ class TimingMeter:
         if last is None:
             return
         interval = now - last
-        bucket = (
-            int(interval * _PER_FINE + 0.5) if interval < FINE_END else _coarse_bucket(interval)
-        )
+        if interval < FINE_END:
+            bucket = int(interval * _PER_FINE + 0.5)
+        else:
+            beyond = min(interval, COARSE_END) - FINE_END
+            bucket = _FINE_BUCKETS + int(beyond * _PER_COARSE + 0.5)
         self._counts[bucket] = self._counts.get(bucket, 0) + 1
         self._every.note(interval)
         if interval > self._longest:
@@ -117,10 +114,6 @@ class TimingMeter:
         buckets, numbers = zip(*spread, strict=True)
         found = bisect_left(list(accumulate(numbers)), rank)  # at most the last one
         return min(_length_of(buckets[found]), self._longest)
-
-
-def _coarse_bucket(interval: float) -> int:
-    return _FINE_BUCKETS + int((min(interval, COARSE_END) - FINE_END) * _PER_COARSE + 0.5)
 
 
 def _length_of(bucket: int) -> float:

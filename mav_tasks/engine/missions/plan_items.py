@@ -73,7 +73,7 @@ def check_fence_item(item: Item, seq: int, *, count: int) -> None:
     """Raise Rejection if an item of a fence with ``count`` items is bad."""
     name, value = f"item {seq + 1}", item.param1
     _check_command(item, name, OF_FENCE, "a fence")
-    _place(item)
+    place_of(item)
     if item.command in CORNERS and not (3 <= value <= count and value == int(value)):
         words = f"{name}: param1 {value:g} corners: not a whole number in 3..{count}"
         raise bad(words, param=1)
@@ -87,7 +87,7 @@ def check_fence_item(item: Item, seq: int, *, count: int) -> None:
 def check_rally_item(item: Item, seq: int) -> None:
     """Raise Rejection if a rally point is bad."""
     _check_command(item, f"item {seq + 1}", (MavCmd.NAV_RALLY_POINT,), "rally points")
-    _place(item)
+    place_of(item)
 
 
 def fence_of(items: Sequence[Item]) -> Fence:
@@ -104,9 +104,9 @@ def fence_of(items: Sequence[Item]) -> Fence:
             if [(each.command, each.param1) for each in corners] != [(code, size)] * number:
                 words = f"item {seq + 1}: polygon of {number} corners is incomplete or mixed"
                 raise Rejection(R.BAD_PARAMETER, words)
-            zones.append(Polygon(tuple(map(_place, corners)), CORNERS[code], group))
+            zones.append(Polygon(tuple(map(place_of, corners)), CORNERS[code], group))
         elif code in CIRCLES and not _is_no_circle(item):
-            zones.append(Circle(_place(item), size, CIRCLES[code], group))
+            zones.append(Circle(place_of(item), size, CIRCLES[code], group))
         seq += number
     fence = Fence(tuple(zones))
     wrong = check(fence)
@@ -120,15 +120,11 @@ def fence_for_vehicle(items: Sequence[Item]) -> tuple[Item, ...]:
     return tuple(item for item in items if not _is_no_circle(item))
 
 
-def rally_of(items: Sequence[Item]) -> tuple[GlobalPlace, ...]:
-    return tuple(map(_place, items))
-
-
 def _is_no_circle(item: Item) -> bool:
     return item.command in CIRCLES and item.param1 == 0.0
 
 
-def _place(item: Item) -> GlobalPlace:
+def place_of(item: Item) -> GlobalPlace:
     if item.frame not in GLOBAL_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {item.frame} is not supported here")
     if abs(item.x) > MAX_LATITUDE:

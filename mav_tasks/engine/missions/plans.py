@@ -9,7 +9,7 @@ from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
-from mav_tasks.engine.missions.plan_items import fence_of, plan_of, rally_of, steps_of
+from mav_tasks.engine.missions.plan_items import fence_of, place_of, plan_of, steps_of
 from mav_tasks.engine.missions.plan_table import MissionParseOptions
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
@@ -116,7 +116,7 @@ class Plans:
         if kind == MavMissionType.FENCE:
             bounds.fence = fence_of(unpacked(stored.source))
         elif kind == MavMissionType.RALLY:
-            bounds.rally = rally_of(unpacked(stored.source))
+            bounds.rally = tuple(map(place_of, unpacked(stored.source)))
 
     def end_replaced(self, vehicle: Vehicle, *, is_started: bool, actor: str, now: float) -> None:
         """End the missions that the staged one has replaced, as on an autopilot.

@@ -54,17 +54,17 @@ class Armings:
         may_be = is_soon and self._client_at > self._outdated_at
         return self._is_clients if self._is_armed else may_be
 
-    def outdate(self, *, ours: float, armed: bool, now: float) -> None:
+    def outdate(self, *, ours: float, armed: bool, now: float, only_ours: bool = False) -> None:
         """Outdate earlier requests to arm, because the vehicle is to be disarmed or stopped.
 
-        ``ours`` is when we last asked for arming ourselves.
+        ``ours`` is when we last asked for arming ourselves. ``only_ours``: only that one, if it is
+        the latest, because we need it armed no more.
         """
-        self._outdate(max(ours, self._client_at), armed=armed, now=now)
-
-    def outdate_ours(self, *, ours: float, armed: bool, now: float) -> None:
-        """Outdate our own request to arm, if it is the latest: we need it armed no more."""
-        if self._client_at < ours:
-            self._outdate(ours, armed=armed, now=now)
+        asked_at = max(ours, self._client_at)
+        is_meant = not only_ours or self._client_at < ours
+        if is_meant and now - asked_at <= LATE:
+            self._outdated_at, self._was_disarmed = now, not armed
+            self._may_show_until = min(asked_at + RESENT, now) + SHOWN_LATE
 
     def outdate_earlier(self, *, armed: bool, until: float, now: float) -> None:
         """Outdate the requests of an earlier run; their effect may show ``until`` then."""
@@ -93,11 +93,6 @@ class Armings:
     def forget_halts(self) -> None:
         """Forget the halts: any arming from here on counts."""
         self._may_show_until, self.is_to_be_disarmed = -inf, False
-
-    def _outdate(self, asked_at: float, *, armed: bool, now: float) -> None:
-        if now - asked_at <= LATE:
-            self._outdated_at, self._was_disarmed = now, not armed
-            self._may_show_until = min(asked_at + RESENT, now) + SHOWN_LATE
 
     def _may_be_older(self, ours: float, now: float) -> bool:
         return self._was_disarmed and ours <= self._outdated_at and now <= self._may_show_until
@@ -219,11 +214,11 @@ class Authority:
         """Note a client's command to the vehicle that may make it drive, in a mode of its own."""
         self._passed_on[ANY_MODE] = now
 
-    def was_asked_before(self, mode: int, *, ours: float, halt: float) -> bool:
+    def was_asked_before(self, mode: int, *, ours: float = -inf, halt: float) -> bool:
         """Return whether a mode shown now was asked for shortly before a halt, and not since.
 
         Also if it was shown before the halt: the network may hold a copy of the request. ``ours``
-        is when we last asked for our mode.
+        is when we last asked for our mode. ANY_MODE: what may move the vehicle in any mode.
         """
         asked = self._asked_for(mode, ours=ours)
         return asked < halt <= asked + LATE
@@ -235,11 +230,6 @@ class Authority:
     def _asked_for(self, mode: int, *, ours: float) -> float:
         asked = max(self._passed_on.get(mode, -inf), self._passed_on.get(ANY_MODE, -inf))
         return max(asked, ours) if mode == self._persona.control_mode else asked
-
-    def moves_by_older(self, *, halt: float) -> bool:
-        """Return whether a client's command from before a halt may move the vehicle in any mode."""
-        asked = self._passed_on.get(ANY_MODE, -inf)
-        return asked < halt <= asked + LATE
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
         """Return what the present mode means for taking control.

@@ -205,12 +205,13 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             parts.authority.restore_arming()
             parts.armings.forget_halts()
             tasks.let_arm(may_be_armed=True, now=now)
-        case Effect.OUTDATE_ARMING:
-            ours, armed = control.arming_asked_at, parts.monitor.armed
-            parts.armings.outdate(ours=ours, armed=armed, now=now)
-        case Effect.OUTDATE_OUR_ARMING:
-            ours, armed = control.arming_asked_at, parts.monitor.armed
-            parts.armings.outdate_ours(ours=ours, armed=armed, now=now)
+        case Effect.OUTDATE_ARMING | Effect.OUTDATE_OUR_ARMING:
+            parts.armings.outdate(
+                ours=control.arming_asked_at,
+                armed=parts.monitor.armed,
+                only_ours=effect is Effect.OUTDATE_OUR_ARMING,
+                now=now,
+            )
         case Effect.EXPECT_DISARMED:
             parts.armings.is_to_be_disarmed = parts.monitor.armed
         case Effect.DISARM:

@@ -113,14 +113,6 @@ class Parts:
         ours = self.control.arming_asked_at
         return self.monitor.armed and not self.armings.do_not_count(ours=ours, now=now)
 
-    def _is_unknown(self, *, now: float) -> bool:
-        """Return whether it has not said which vehicle it is, or who else controls it.
-
-        It may also have just restarted.
-        """
-        unidentified = bool(self.tasks.uid) and not self.requests.is_identified
-        return unidentified or bool(self.undecided) or now < self.listens_until
-
     def note(self, text: str, *, now: float) -> None:
         """Report a text about the vehicle."""
         self.registry.record(VehicleNoted(self.system_id, text, now))
@@ -214,7 +206,10 @@ class Parts:
             turning=persona.turning,
             turns_by_course=persona.turns_by_course,
             turning_radius=persona.turning_radius or self.settings.driving.turning_radius,
-            is_unknown=self._is_unknown(now=now),
+            # who it is, or who else controls it; it may also have just restarted
+            is_unknown=bool(self.tasks.uid and not self.requests.is_identified)
+            or bool(self.undecided)
+            or now < self.listens_until,
             drives_on=drives_on,
             is_engaged=control.is_engaged,
             is_ours=self.lease.is_trusted,

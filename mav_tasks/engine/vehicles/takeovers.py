@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from math import inf
 
-from mav_tasks.engine.vehicles.authority import SHOWN_LATE, Before
+from mav_tasks.engine.vehicles.authority import ANY_MODE, SHOWN_LATE, Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.joint_control import BUTTONS, JointControl, Word
 from mav_tasks.engine.vehicles.motion_guard import NEARLY_STANDS
@@ -249,7 +249,7 @@ class Takeovers:
             and is_held
             and halts.is_by_word
             and not halts.is_undone
-            and parts.authority.moves_by_older(halt=halts.at)
+            and parts.authority.was_asked_before(ANY_MODE, halt=halts.at)
             and not parts.where.is_still(now=now)
         )
 
