@@ -29,10 +29,8 @@ MANY = 60_000
 PATIENCE = 0.3  # s without an answer, after which outstanding commands count as lost
 BEAT = 0.5  # s, between the vehicle's heartbeats
 
-GOAL_RATIO = 2.5  # these are the goals of a pure core
-GOAL_RATE = 15_000
-GOAL_DURABLE_RATIO = 2.0
-GOAL_DURABLE_RATE = 10_000
+GOAL_RATIO, GOAL_DURABLE_RATIO = 1.6, 1.5  # of the yardstick's time
+GOAL_RATE, GOAL_DURABLE_RATE = 0.65, 0.5  # of the echo's
 SYNCS = 1_000
 PAGE = 4_096  # bytes
 
@@ -50,8 +48,8 @@ def measure(profile: str | None = None) -> list[Row]:
             f"{ours[2]:,.0f} /s",
             f"{echo[2]:,.0f} /s echo",
             f"{ours[2] / echo[2]:.0%}",
-            f"≥ {GOAL_RATE:,} /s",
-            ours[2] >= GOAL_RATE,
+            f"≥ {GOAL_RATE:.0%}",
+            ours[2] >= GOAL_RATE * echo[2],
         ),
     ]
 
@@ -73,8 +71,8 @@ def measure_durable() -> list[Row]:
         f"{ours[2]:,.0f} /s",
         f"{echo[2]:,.0f} /s echo",
         f"{ours[2] / echo[2]:.0%}",
-        f"≥ {GOAL_DURABLE_RATE:,} /s",
-        ours[2] >= GOAL_DURABLE_RATE,
+        f"≥ {GOAL_DURABLE_RATE:.0%}",
+        ours[2] >= GOAL_DURABLE_RATE * echo[2],
     )
     return [*rows, rate]
 

@@ -22,7 +22,7 @@ WINDOW = 64
 WARM_UP = 5_000
 PACKETS = 100_000
 PATIENCE = 0.3  # s without a packet, after which packets under way count as lost
-GOAL = 0.7
+GOAL = 0.9
 
 
 def measure(profile: str | None = None) -> list[Row]:

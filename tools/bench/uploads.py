@@ -16,7 +16,7 @@ from .child import HOST, ROOT, child, free_port, simulated_rovers
 from .table import Row
 
 GIVE_UP = 180.0  # s
-GOAL = 3.0  # times MAVSDK's own
+GOAL = 2.0  # times MAVSDK's own
 
 
 def measure(profile: str | None = None) -> list[Row]:
