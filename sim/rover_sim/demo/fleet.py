@@ -55,6 +55,10 @@ def _drive(screen: Screen, ends: ExitStack, *, body: str) -> int:
     for name, port in zip(GATEWAYS, ports, strict=True):
         gateways.append(_Gateway(folder, name, port, rover_port, url))
         ends.enter_context(closing(gateways[-1]))
+        # the second begins when the first has all of them, or it might get them instead
+        _until(
+            lambda: len(_holders(url).get(GATEWAYS[0], ())) == ROVERS, what="rovers that are held"
+        )
     killed, survivor = GATEWAYS
     client = ends.enter_context(SyncClient(f"udpout:127.0.0.1:{ports[-1]}", timeout=LIMIT))
     _until(lambda: _are_ready(client), what="rovers that are ready")
