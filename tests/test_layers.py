@@ -46,13 +46,13 @@ fleet_link: clock engine fleet_io links
 gateway: clock engine errors fleet fleet_io fleet_link settings store
 serve: clock config engine errors gateway key_ring link_keys links logs metrics observer
     recording runner settings store tasks
-client: errors latest links mavlink plan_files services tasks
+client: errors latest links mavlink plan_files services setting_keys tasks
 crowd:
 http_connections: crowd logs settings
-agents: client errors http_connections mavlink tasks
+agents: client errors http_connections mavlink setting_keys tasks
 qgc_actions: errors mavlink whole_file
 web: client crowd engine errors folders histogram http_connections key_ring latest logs mavlink
-    metrics plan_files recording services settings store tasks
+    metrics plan_files recording services setting_keys settings store tasks
 probe: engine errors mavlink services settings tasks
 probing: client errors links mavlink probe
 cli: agents client config errors folders key_ring link_keys links logs mavlink mcap_export

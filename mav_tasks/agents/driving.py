@@ -3,97 +3,41 @@
 from typing import Any
 
 from mav_tasks.agents import submission
-from mav_tasks.agents.arguments import Argument
 from mav_tasks.agents.forms import DONE, TASK, task_form
-from mav_tasks.agents.reading import TASK_ID, VEHICLE_ID
+from mav_tasks.agents.reading import ID, ROVER
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
 from mav_tasks.client.goal_form import goal_schema
-from mav_tasks.client.idempotency import LONGEST
-from mav_tasks.tasks.task import MAX_PRIORITY
-
-MOST_GOALS = 100
-LONGEST_DELAY = 30 * 86_400  # s
-
-EPOCH = Argument(
-    "epoch",
-    {
-        "type": "integer",
-        "minimum": 1,
-        "description": "halt_epoch that you read in task or queue; refused if anything has "
-        "stopped the rover since then: read again, and think again",
-    },
-    is_required=True,
+from mav_tasks.client.parts import (
+    AFTER,
+    DEADLINE,
+    DELAY,
+    EPOCH,
+    GOALS,
+    HOW,
+    KEY_TEXT,
+    LABEL,
+    PRIORITY,
 )
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import Items, Number
+
+SOON = Number(0, 30 * 86_400, "s")
 SUBMISSION = (
-    Argument(
-        "goals",
-        {
-            "type": "array",
-            "minItems": 1,
-            "maxItems": MOST_GOALS,
-            "items": goal_schema(),
-            "description": "what the rover does, one goal after the other",
-        },
-        is_required=True,
-    ),
-    Argument(
+    Part("goals", Items(goal_schema(), 1, 100), GOALS.meaning, True),
+    Part(
         "idempotency_key",
-        {
-            "type": "string",
-            "minLength": 1,
-            "maxLength": LONGEST,
-            "description": "a text of your own that names this task, such as a UUID; note it "
-            "before you submit, and use it again if you submit again",
-        },
-        is_required=True,
+        KEY_TEXT,
+        "a text of your own that names this task, such as a UUID; note it before you submit, and "
+        "use it again if you submit again",
+        True,
     ),
-    VEHICLE_ID,
-    Argument(
-        "priority",
-        {
-            "type": "integer",
-            "minimum": 0,
-            "maximum": MAX_PRIORITY,
-            "description": "10 is the highest; default 5",
-        },
-    ),
-    Argument(
-        "after",
-        {"type": "integer", "minimum": 1, "description": "id of a task that must complete first"},
-    ),
-    Argument(
-        "start_in",
-        {
-            "type": "number",
-            "minimum": 0,
-            "maximum": LONGEST_DELAY,
-            "description": "earliest start, s from now",
-        },
-    ),
-    Argument(
-        "deadline",
-        {
-            "type": "number",
-            "minimum": 0,
-            "maximum": LONGEST_DELAY,
-            "description": "latest start, s from now; then the task expires",
-        },
-    ),
-    Argument(
-        "label",
-        {"type": "string", "maxLength": 24, "description": "a name for people, up to 24 bytes"},
-    ),
-)
-HOW = Argument(
-    "how",
-    {
-        "type": "string",
-        "enum": ["again", "remainder", "skip"],
-        "description": "'remainder' finishes the task, 'again' repeats all of it from where the "
-        "rover is, 'skip' drops it",
-    },
-    is_required=True,
+    ROVER,
+    PRIORITY,
+    AFTER,
+    Part("start_in", SOON, DELAY.meaning),
+    Part("deadline", SOON, DEADLINE.meaning),
+    LABEL,
 )
 
 
@@ -139,7 +83,7 @@ STOP = Tool(
     "STOP",
     "Stop every rover at once, or the named one. If in doubt, call it: it needs no permission. The "
     "running task ends; no task runs until resume, which needs the role 'operator'.",
-    (VEHICLE_ID,),
+    (ROVER,),
     DONE,
     _stop,
     is_destructive=True,
@@ -169,7 +113,7 @@ def driving(limits: str) -> tuple[Tool, ...]:
             "cancel",
             "Cancel a task",
             "Cancel a task. If it is being driven, the rover stops; the next task then starts.",
-            (TASK_ID,),
+            (ID,),
             TASK,
             _cancel,
             is_destructive=True,
@@ -179,7 +123,7 @@ def driving(limits: str) -> tuple[Tool, ...]:
             "Release a held task",
             "Decide about a held task, which blocks its rover: finish it, repeat it, or drop it. "
             "Find out first why it is held. If the queue is paused, call resume, too.",
-            (TASK_ID, HOW, EPOCH),
+            (ID, HOW, EPOCH),
             TASK,
             _release,
             is_destructive=True,
@@ -189,7 +133,7 @@ def driving(limits: str) -> tuple[Tool, ...]:
             "pause",
             "Pause a rover",
             "Stop a rover; its task and its queue continue on resume.",
-            (VEHICLE_ID,),
+            (ROVER,),
             DONE,
             _pause,
         ),
@@ -198,7 +142,7 @@ def driving(limits: str) -> tuple[Tool, ...]:
             "Resume a rover",
             "Let a rover drive its tasks again after a pause, a STOP or a takeover; needs the role "
             "'operator'. If a person has stopped the rover, ask that person first.",
-            (VEHICLE_ID, EPOCH),
+            (ROVER, EPOCH),
             DONE,
             _resume,
             is_destructive=True,

@@ -4,7 +4,6 @@ import asyncio
 from datetime import UTC, datetime
 from typing import Any
 
-from mav_tasks.agents.arguments import Argument
 from mav_tasks.agents.forms import (
     FINISHED,
     QUEUE,
@@ -21,37 +20,21 @@ from mav_tasks.agents.tool import Report, Tool, Values
 from mav_tasks.client.descriptions import needs_decision, state_of, what_of, why_of
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import vehicle_json
+from mav_tasks.client.parts import TASK_ID, VEHICLE_ID
 from mav_tasks.client.values import TaskStatus
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import Number
 
 LONGEST_WAIT = 300  # s
 USUAL_WAIT = 30  # s; many programs of agents end a call after a minute
 REPORTS = 1.0  # s between two reports of progress
 LEAST_STEP = 1e-6  # between two reports
 
-VEHICLE_ID = Argument(
-    "vehicle",
-    {
-        "type": "integer",
-        "minimum": 1,
-        "maximum": 255,
-        "description": "system id of the rover; can be left out if there is only one",
-    },
-)
-TASK_ID = Argument(
-    "id", {"type": "integer", "minimum": 1, "description": "id of the task"}, is_required=True
-)
-LIMIT = Argument(
-    "limit",
-    {"type": "integer", "minimum": 0, "maximum": 100, "description": "most tasks; default 20"},
-)
-SECONDS = Argument(
-    "seconds",
-    {
-        "type": "number",
-        "minimum": 0,
-        "maximum": LONGEST_WAIT,
-        "description": f"how long to wait at most, s; default {USUAL_WAIT}",
-    },
+ROVER = Part("vehicle", VEHICLE_ID, "system id of the rover; can be left out if there is only one")
+ID = Part("id", TASK_ID, "id of the task", True)
+LIMIT = Part("limit", Number(0, 100, is_whole=True), "most tasks; default 20")
+SECONDS = Part(
+    "seconds", Number(0, LONGEST_WAIT, "s"), f"how long to wait at most; default {USUAL_WAIT}"
 )
 
 
@@ -128,7 +111,7 @@ READING = (
         "Queue",
         "Show the running and the waiting tasks of a rover, why each waits, whether the queue is "
         "paused, and the halt_epoch that resume and release need. 'advice' says what to do now.",
-        (VEHICLE_ID, LIMIT),
+        (ROVER, LIMIT),
         QUEUE,
         _queue,
         is_reading=True,
@@ -137,7 +120,7 @@ READING = (
         "history",
         "Finished tasks",
         "List finished tasks of a rover, newest first: how each ended, why and when.",
-        (VEHICLE_ID, LIMIT),
+        (ROVER, LIMIT),
         an_object(tasks=a_list(FINISHED)),
         _history,
         is_reading=True,
@@ -146,7 +129,7 @@ READING = (
         "task",
         "Task",
         "Show one task: its state, progress, why it waits, and in 'advice' what to do now.",
-        (TASK_ID,),
+        (ID,),
         TASK,
         _task,
         is_reading=True,
@@ -157,7 +140,7 @@ READING = (
         "Wait until a task has ended, or until it is held, or for this many seconds. Then show the "
         "task as it is: if is_over is false, do what 'advice' says, or call wait again. "
         "A task that is held does not continue by itself: it needs release.",
-        (TASK_ID, SECONDS),
+        (ID, SECONDS),
         TASK,
         _wait,
         is_reading=True,

@@ -18,7 +18,6 @@ from mcp_types import (
 )
 from mcp_types import Tool as ToolForm
 
-from mav_tasks.agents.arguments import read, schema_of
 from mav_tasks.agents.driving import STOP, driving
 from mav_tasks.agents.durable import Durable
 from mav_tasks.agents.durable_requests import DurableRequests, has_tasks
@@ -27,6 +26,7 @@ from mav_tasks.agents.reading import READING
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Tool
 from mav_tasks.errors import ClientError, UsageError
+from mav_tasks.setting_keys.parts import read_all, schema_of
 
 INSTRUCTIONS = """\
 Rovers that drive on the ground, and their queues of tasks. Read vehicles and queue first. Submit \
@@ -75,7 +75,7 @@ class Calls:
             await context.session.report_progress(progress, 1.0, message)
 
         try:
-            values = read(tool.arguments, params.arguments or {})
+            values = read_all(tool.arguments, params.arguments or {})
             form = await tool.run(self._rovers, values, report)
             if tool.makes_a_task and self._durable is not None and has_tasks(context):
                 return self._durable.created(await self._rovers.status(form["id"]))

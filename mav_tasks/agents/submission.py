@@ -11,7 +11,7 @@ from typing import Any
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
-from mav_tasks.client.goal_form import goal_of
+from mav_tasks.client.goal_form import goals_of
 from mav_tasks.client.idempotency import Numbers, numbers_of
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.client.wire import Goal
@@ -36,11 +36,8 @@ class Wish:
 
     @classmethod
     def of(cls, rover: int, values: dict[str, Any]) -> "Wish":
-        """Return the wish in a tool's arguments. Raise UsageError if a goal is invalid."""
-        try:
-            goals = [goal_of(form, f"goals[{at}]") for at, form in enumerate(values["goals"])]
-        except ValueError as error:
-            raise UsageError(str(error)) from error
+        """Return the wish in a tool's arguments. Raise SettingError if a goal is invalid."""
+        goals = goals_of(values["goals"])
         terms = {
             "priority": DEFAULT_PRIORITY if values["priority"] is None else values["priority"],
             "after": values["after"] or 0,

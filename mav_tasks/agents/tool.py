@@ -4,8 +4,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mav_tasks.agents.arguments import Argument
 from mav_tasks.agents.rovers import Rovers
+from mav_tasks.setting_keys.parts import Part
 
 Values = dict[str, Any]  # of all arguments; None: not given
 #: takes the part that is done, 0 to 1, and what happens
@@ -24,7 +24,7 @@ class Tool:
     name: str
     title: str
     about: str
-    arguments: Sequence[Argument]
+    arguments: Sequence[Part]
     returns: Mapping[str, Any]
     run: Run
     is_reading: bool = False

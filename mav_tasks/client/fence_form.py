@@ -3,10 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mav_tasks.client.goal_form import shortened
 from mav_tasks.plan_files import FenceCircle, FencePolygon, PlanFile
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import Number
 
 DEGREE = 1e7  # of MAVLink's integers
+PLACE = (
+    Part("latitude", Number(-90.0, 90.0, "deg"), "latitude, WGS 84", True),
+    Part("longitude", Number(-180.0, 180.0, "deg"), "longitude, WGS 84", True),
+)
+CIRCLE = (*PLACE, Part("radius", Number(0.1, 100_000.0, "m"), "radius", True))
 
 
 def shapes_of(plan: PlanFile) -> list[dict[str, Any]]:
@@ -15,16 +21,23 @@ def shapes_of(plan: PlanFile) -> list[dict[str, Any]]:
 
 
 def circle_of(value: Mapping[str, Any]) -> PlanFile:
-    """Return a fence that keeps a rover inside a circle. Raise ValueError if it is invalid."""
-    radius = _number(value, "circle", "radius", least=0.1, most=100_000.0)
-    circle = FenceCircle(True, _place_of(value, "circle"), radius)
+    """Return a fence that keeps a rover inside a circle. Raise SettingError if it is invalid."""
+    parts = _read(CIRCLE, value, "circle.")
+    circle = FenceCircle(True, _degE7(parts["latitude"], parts["longitude"]), parts["radius"])
     return PlanFile((), None, (circle,), ())
 
 
 def polygon_of(value: Sequence[Any]) -> PlanFile:
-    """Return a fence that keeps a rover inside a polygon. Raise ValueError if it is invalid."""
-    places = tuple(_place_of(place, f"polygon[{at}]") for at, place in enumerate(value))
-    return PlanFile((), None, (FencePolygon(True, places),), ())
+    """Return a fence that keeps a rover inside a polygon. Raise SettingError if it is invalid."""
+    places = (_read(PLACE, place, f"polygon[{at}].") for at, place in enumerate(value))
+    polygon = FencePolygon(True, tuple(_degE7(**place) for place in places))
+    return PlanFile((), None, (polygon,), ())
+
+
+def _read(parts: Sequence[Part], value: object, within: str) -> dict[str, float]:
+    """Return the parts of a place, which may have others, such as its local coordinates."""
+    form = value if isinstance(value, Mapping) else {}
+    return {part.name: part.read(form, within) for part in parts}
 
 
 def _shape_of(part: FenceCircle | FencePolygon) -> dict[str, Any]:
@@ -44,16 +57,5 @@ def _form_of(place: tuple[int, int]) -> dict[str, float]:
     return {"latitude": place[0] / DEGREE, "longitude": place[1] / DEGREE}
 
 
-def _place_of(value: Any, name: str) -> tuple[int, int]:
-    latitude = _number(value, name, "latitude", least=-90.0, most=90.0)
-    longitude = _number(value, name, "longitude", least=-180.0, most=180.0)
+def _degE7(latitude: float, longitude: float) -> tuple[int, int]:
     return round(latitude * DEGREE), round(longitude * DEGREE)
-
-
-def _number(value: Any, name: str, part: str, *, least: float, most: float) -> float:
-    found: Any = value.get(part) if isinstance(value, Mapping) else None
-    is_number = isinstance(found, int | float) and not isinstance(found, bool)
-    if not is_number or not least <= found <= most:  # false for NaN, and right for any int
-        words = f"expected a number from {least:g} to {most:g}"
-        raise ValueError(f"{name}.{part} {shortened(found)}: {words}")
-    return float(found)

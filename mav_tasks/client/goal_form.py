@@ -4,130 +4,147 @@ Distances are in metres, angles in degrees clockwise, times in seconds:
 ``{"kind": "goto", "north": 4, "east": -2, "speed": 0.5}``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import radians
 from typing import Any
 
+from mav_tasks.client.fence_form import PLACE
 from mav_tasks.client.wire import Goal
+from mav_tasks.errors import SettingError
+from mav_tasks.setting_keys.parts import Part, read_all, schema_of, shortened
+from mav_tasks.setting_keys.shapes import LARGEST, Number
 from mav_tasks.tasks.goal import Drive, Face, GlobalPlace, GoTo, LocalPlace, Move, Rotate, Wait
 
 DEGREE = 1e7  # of MAVLink's integers
-LARGEST = 3.4e38  # what a float32 of MAVLink holds
-
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    """A number of a goal; ``unit`` in words for people; ``least`` and ``most``: None: any."""
-
-    name: str
-    unit: str
-    meaning: str
-    is_required: bool = False
-    least: float | None = None
-    most: float | None = None
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        """The JSON schema of the number."""
-        bounds = {"minimum": self.least, "maximum": self.most}
-        return {
-            "type": "number",
-            "description": f"{self.meaning} ({self.unit})",
-            **{name: bound for name, bound in bounds.items() if bound is not None},
-        }
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of goal: what the rover does, and the goal's numbers."""
+    """A kind of goal: what the rover does, the goal's numbers, and what makes it of them."""
 
     name: str
     meaning: str
-    numbers: tuple[Number, ...]
+    numbers: tuple[Part, ...]
+    make: Callable[..., Goal]
 
     @property
     def schema(self) -> dict[str, Any]:
         """The JSON schema of a goal of this kind."""
-        return {
-            "type": "object",
+        schema = schema_of(self.numbers)
+        return schema | {
             "description": self.meaning,
-            "properties": {
-                "kind": {"const": self.name, "type": "string"},
-                **{number.name: number.schema for number in self.numbers},
-            },
-            "required": ["kind", *(each.name for each in self.numbers if each.is_required)],
-            "additionalProperties": False,
+            "properties": {"kind": {"const": self.name, "type": "string"}, **schema["properties"]},
+            "required": ["kind", *schema["required"]],
         }
 
 
-SPEED = Number("speed", "m/s", "speed; the server's default if not given", least=0.0)
-RATE = Number("rate", "deg/s", "turn rate; the server's default if not given", least=0.0)
+def _any(unit: str, scale: float = 1.0) -> Number:
+    return Number(-LARGEST, LARGEST, unit, scale)
+
+
+def _positive(unit: str, scale: float = 1.0) -> Number:
+    return Number(0, LARGEST, unit, scale)
+
+
+def _global(latitude: float, longitude: float, **others: Any) -> GoTo:
+    return _way(GlobalPlace(round(latitude * DEGREE), round(longitude * DEGREE)), **others)
+
+
+def _local(north: float, east: float, **others: Any) -> GoTo:
+    return _way(LocalPlace(north, east), **others)
+
+
+def _way(
+    place: LocalPlace | GlobalPlace, *, heading: float | None, wait: float | None, **others: Any
+) -> GoTo:
+    return GoTo(place, yaw=heading, wait=wait or 0.0, **others)
+
+
+def _face(heading: float, direction: int | None, rate: float | None) -> Face:
+    return Face(heading, direction or 0, rate)
+
+
+def _home(speed: float | None) -> GoTo:
+    return GoTo(None, speed)
+
+
+ANGLE = radians(1)
+SPEED = Part("speed", _positive("m/s"), "speed; the server's default if not given")
+RATE = Part("rate", _positive("deg/s", ANGLE), "turn rate; the server's default if not given")
 HEADING = "heading, clockwise from north"
+DURATION = Part("duration", _positive("s"), "how long", True)
 ON_ARRIVAL = (
-    Number("radius", "m", "acceptance radius; as close as possible if not given", least=0.0),
-    Number("heading", "deg", f"final {HEADING}; any if not given"),
-    Number("wait", "s", "how long to stand there; 0 if not given", least=0.0),
+    Part("radius", _positive("m"), "acceptance radius; as close as possible if not given"),
+    Part("heading", _any("deg", ANGLE), f"final {HEADING}; any if not given"),
+    Part("wait", _positive("s"), "how long to stand there; 0 if not given"),
 )
 
 KINDS = (
     Kind(
         "move",
         "Drive straight along the heading that the rover has at the start.",
-        (Number("distance", "m", "distance; negative: backwards", True), SPEED),
+        (Part("distance", _any("m"), "distance; negative: backwards", True), SPEED),
+        Move,
     ),
     Kind(
         "rotate",
         "Turn on the spot by an angle.",
-        (Number("angle", "deg", "angle; positive: clockwise", True), RATE),
+        (Part("angle", _any("deg", ANGLE), "angle; positive: clockwise", True), RATE),
+        Rotate,
     ),
     Kind(
         "drive",
         "Drive at a constant velocity for some time.",
         (
-            Number("forward", "m/s", "speed; negative: backwards", True),
-            Number("yaw_rate", "deg/s", "yaw rate; positive: clockwise", True),
-            Number("duration", "s", "how long", True, 0.0),
+            Part("forward", _any("m/s"), "speed; negative: backwards", True),
+            Part("yaw_rate", _any("deg/s", ANGLE), "yaw rate; positive: clockwise", True),
+            DURATION,
         ),
+        Drive,
     ),
     Kind(
         "goto",
         "Drive to a place in the rover's local frame.",
         (
-            Number("north", "m", "metres north of the local origin", True),
-            Number("east", "m", "metres east of the local origin", True),
+            Part("north", _any("m"), "metres north of the local origin", True),
+            Part("east", _any("m"), "metres east of the local origin", True),
             SPEED,
             *ON_ARRIVAL,
         ),
+        _local,
     ),
     Kind(
         "goto_global",
         "Drive to a place on earth.",
         (
-            Number("latitude", "deg", "latitude, WGS 84", True, -90.0, 90.0),
-            Number("longitude", "deg", "longitude, WGS 84", True, -180.0, 180.0),
+            *PLACE,
             SPEED,
             *ON_ARRIVAL,
         ),
+        _global,
     ),
     Kind(
         "face",
         "Turn on the spot to a heading.",
         (
-            Number("heading", "deg", HEADING, True),
-            Number(
+            Part("heading", _any("deg", ANGLE), HEADING, True),
+            Part(
                 "direction",
-                "",
+                Number(-1, 1, is_whole=True),
                 "1 clockwise, -1 counter-clockwise, 0 or not given: the shorter",
-                False,
-                -1,
-                1,
             ),
             RATE,
         ),
+        _face,
     ),
-    Kind("wait", "Stand still.", (Number("duration", "s", "how long", True, 0.0),)),
-    Kind("home", "Return to the nearest rally point, else home.", (SPEED,)),
+    Kind("wait", "Stand still.", (DURATION,), Wait),
+    Kind(
+        "home",
+        "Return to the nearest rally point, else home.",
+        (SPEED,),
+        lambda speed: GoTo(None, speed),
+    ),
 )
 BY_NAME = {kind.name: kind for kind in KINDS}
 
@@ -137,81 +154,17 @@ def goal_schema() -> dict[str, Any]:
     return {"oneOf": [kind.schema for kind in KINDS]}
 
 
-def goal_of(form: object, name: str = "goal") -> Goal:
-    """Return the goal of a JSON object. Raise ValueError, with the part's name, if it is invalid.
+def goals_of(forms: Sequence[object]) -> list[Goal]:
+    """Return the goals of a request. Raise SettingError that names the part that is invalid."""
+    return [_goal_of(form, f"goals[{at}]") for at, form in enumerate(forms)]
 
-    ``name`` is the object's name in the request.
-    """
+
+def _goal_of(form: object, name: str) -> Goal:
     if not isinstance(form, Mapping):
-        raise ValueError(f"{name}: expected an object, such as {{'kind': 'move', 'distance': 2}}")
+        raise SettingError(f"{name}: expected an object, such as {{'kind': 'move', 'distance': 2}}")
     kind = BY_NAME.get(form["kind"]) if isinstance(form.get("kind"), str) else None
     if kind is None:
         words = f"expected one of {', '.join(BY_NAME)}"
-        raise ValueError(f"{name}.kind {shortened(form.get('kind'))}: {words}")
-    known = {number.name for number in kind.numbers} | {"kind"}
-    for each in form:
-        if each not in known:
-            words = f"a goal '{kind.name}' has no such part"
-            raise ValueError(f"{name}.{shortened(each)[1:-1]}: {words}")
-    return _made(kind.name, {each.name: _read(each, form, name) for each in kind.numbers})
-
-
-def shortened(value: object) -> str:
-    """Return a wrong value for a message: printable, at most 60 characters."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _read(number: Number, form: Mapping[str, Any], name: str) -> float | None:
-    value = form.get(number.name)
-    where = f"{name}.{number.name}"
-    if value is None:
-        if number.is_required:
-            raise ValueError(f"{where}: missing; expected {number.meaning} ({number.unit})")
-        return None
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not -LARGEST <= value <= LARGEST:  # false for NaN, and right for any int
-        raise ValueError(f"{where} {shortened(value)}: expected a number ({number.unit})")
-    if number.least is not None and value < number.least:
-        raise ValueError(f"{where} {value:g}: expected at least {number.least:g} {number.unit}")
-    if number.most is not None and value > number.most:
-        raise ValueError(f"{where} {value:g}: expected at most {number.most:g} {number.unit}")
-    return float(value)
-
-
-def _made(kind: str, numbers: Mapping[str, Any]) -> Goal:
-    match kind:
-        case "move":
-            return Move(numbers["distance"], numbers["speed"])
-        case "rotate":
-            return Rotate(radians(numbers["angle"]), _radians(numbers["rate"]))
-        case "drive":
-            yaw_rate = radians(numbers["yaw_rate"])
-            return Drive(numbers["forward"], yaw_rate, numbers["duration"])
-        case "goto":
-            return _way(LocalPlace(numbers["north"], numbers["east"]), numbers)
-        case "goto_global":
-            latitude, longitude = numbers["latitude"], numbers["longitude"]
-            place = GlobalPlace(round(latitude * DEGREE), round(longitude * DEGREE))
-            return _way(place, numbers)
-        case "face":
-            direction = int(numbers["direction"] or 0)
-            return Face(radians(numbers["heading"]), direction, _radians(numbers["rate"]))
-        case "wait":
-            return Wait(numbers["duration"])
-        case _:
-            return GoTo(None, speed=numbers["speed"])
-
-
-def _way(place: LocalPlace | GlobalPlace, numbers: Mapping[str, Any]) -> GoTo:
-    return GoTo(
-        place,
-        speed=numbers["speed"],
-        radius=numbers["radius"],
-        yaw=_radians(numbers["heading"]),
-        wait=numbers["wait"] or 0.0,
-    )
-
-
-def _radians(angle: float | None) -> float | None:
-    return None if angle is None else radians(angle)
+        raise SettingError(f"{name}.kind {shortened(form.get('kind'))}: {words}")
+    numbers = {part: value for part, value in form.items() if part != "kind"}
+    return kind.make(**read_all(kind.numbers, numbers, f"{name}."))

@@ -1,13 +1,14 @@
-"""The kinds of values of settings, with validation and conversion. Pure.
+"""The kinds of values of settings and requests, with validation and conversion. Pure.
 
-A *plain* value is as people and TOML write it (degrees, days, lists); a *kept* value is as the
-settings have it (radians, seconds, tuples). A SettingError does not name the setting: the caller
-knows it.
+A *plain* value is as people, TOML and JSON write it (degrees, days, lists); a *kept* value is as
+the code has it (radians, seconds, tuples). A SettingError does not name the value's place: the
+caller knows it.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Protocol
 
 from mav_tasks.errors import SettingError
@@ -17,6 +18,7 @@ from mav_tasks.setting_keys.literals import in_digits, literal
 CLIENT = re.compile(r"(\d{1,3})/(\d{1,3})(@[^\s@=,]+)?")
 HIGHEST_PRIORITY = 10
 HIGHEST_ID = 255
+LARGEST = 3.4e38  # a bound that is this far, as far as a float32 goes, is not told
 
 
 class Shape(Protocol):
@@ -69,10 +71,20 @@ class Number:
 
     @property
     def valid(self) -> str:
-        words = f"{in_digits(self.low)}..{in_digits(self.high)}"
-        words += f" {self.unit}" if self.unit else ""
+        unit = f" {self.unit}" if self.unit else ""
+        words = f"{in_digits(self.low)}..{in_digits(self.high)}{unit}"
+        if self.low <= -LARGEST:
+            words = f"any number ({self.unit})" if unit else "any number"
+        elif self.high >= LARGEST:
+            words = f"{in_digits(self.low)}{unit} or more"
         words += ", whole" if self.is_whole else ""
         return words + (f', or "{self.none}"' if self.none else "")
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of a plain value."""
+        bounds = {"minimum": self.low, "maximum": self.high}
+        told = {name: bound for name, bound in bounds.items() if abs(bound) < LARGEST}
+        return {"type": "integer" if self.is_whole else "number", **told}
 
     def kept(self, plain: object) -> float | None:
         """Return the number in the unit of the settings."""
@@ -81,7 +93,8 @@ class Number:
         if isinstance(plain, bool) or not isinstance(plain, int | float):
             raise SettingError(f"not a number: {self.valid}")
         if not self.low <= plain <= self.high:  # also refuses NaN
-            raise SettingError(f"not in {self.valid}")
+            words = "not in" if self.high < LARGEST else "expected"
+            raise SettingError(f"{words} {self.valid}")
         if not self.is_whole:
             return float(plain) * self.scale
         if plain != int(plain):
@@ -119,6 +132,10 @@ class Choice(_AsWritten):
     def valid(self) -> str:
         return " | ".join(f'"{word}"' for word in self.words)
 
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of a word."""
+        return {"type": "string", "enum": list(self.words)}
+
     def kept(self, plain: object) -> str:
         """Return the word; raise SettingError for another one."""
         if plain not in self.words:
@@ -130,6 +147,10 @@ class Choice(_AsWritten):
 class Flag(_AsWritten):
     unit: str = ""
     valid: str = "true | false"
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of a boolean."""
+        return {"type": "boolean"}
 
     def kept(self, plain: object) -> bool:
         """Return the boolean; raise SettingError for another type."""
@@ -144,14 +165,71 @@ class Flag(_AsWritten):
 
 @dataclass(frozen=True, slots=True)
 class Text(_AsWritten):
-    """A text; ``valid`` describes it. An empty text is valid."""
+    """A text of ``least`` to ``most`` characters; ``valid`` describes it."""
 
     valid: str
     unit: str = ""
+    least: int = 0
+    most: int = 0  # 0: any number
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of a text."""
+        return _sized("string", "Length", self.least, self.most)
 
     def kept(self, plain: object) -> str:
         if not isinstance(plain, str) or "\0" in plain:
             raise SettingError(f"not a text: {self.valid}")
+        _check_size(plain, self.least, self.most, "characters")
+        return plain
+
+
+@dataclass(frozen=True, slots=True)
+class Items(_AsWritten):
+    """A JSON list of ``least`` to ``most`` items; ``item`` is their JSON schema."""
+
+    item: Mapping[str, Any]
+    least: int
+    most: int
+    unit: str = ""
+    valid: str = "a list"
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of the list."""
+        return _sized("array", "Items", self.least, self.most) | {"items": dict(self.item)}
+
+    def kept(self, plain: object) -> list[Any]:
+        """Return the list; its items are not checked."""
+        if not isinstance(plain, list):
+            raise SettingError("not a list")
+        _check_size(plain, self.least, self.most, "items")
+        return plain
+
+
+def _sized(kind: str, of: str, least: int, most: int) -> dict[str, Any]:
+    bounds = {f"min{of}": least, f"max{of}": most}
+    return {"type": kind, **{name: bound for name, bound in bounds.items() if bound}}
+
+
+def _check_size(value: Sized, least: int, most: int, what: str) -> None:
+    if len(value) < least or len(value) > (most or inf):
+        bounds = f"{least} to {most}" if least else f"at most {most}"
+        raise SettingError(f"expected {bounds} {what}")
+
+
+@dataclass(frozen=True, slots=True)
+class Record(_AsWritten):
+    """A JSON object, whose parts are not checked."""
+
+    unit: str = ""
+    valid: str = "an object"
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of an object."""
+        return {"type": "object"}
+
+    def kept(self, plain: object) -> dict[str, Any]:
+        if not isinstance(plain, dict):
+            raise SettingError("not an object")
         return plain
 
 

@@ -5,14 +5,16 @@ from typing import Any
 
 from starlette.responses import Response
 
-from mav_tasks.tasks.task import MAX_TASK_ID
-from mav_tasks.web.fields import Field
+from mav_tasks.client.parts import TASK_ID, VEHICLE_ID
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import LARGEST, Number
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 
 NO_RECORDS = "the web process shows no recordings: start it with --records FOLDER"
-LIMIT = Field("limit", "integer", "at most this many", False, 1, 2000)
+SINCE = Number(0, LARGEST, is_whole=True)
+LIMIT = Part("limit", Number(1, 2000, is_whole=True), "at most this many")
 
 
 def operations(services: Services) -> list[Operation]:
@@ -57,7 +59,10 @@ def operations(services: Services) -> list[Operation]:
             "/texts",
             "Texts of rovers and the server, while this process ran",
             texts,
-            query=[Field("before", "integer", "number of a text; older ones", False, 1), LIMIT],
+            query=[
+                Part("before", SINCE, "number of a text; older ones"),
+                LIMIT,
+            ],
             answer="Texts",
         ),
         Operation(
@@ -66,9 +71,9 @@ def operations(services: Services) -> list[Operation]:
             "Events of the store: the latest of a day or of a task, or those after a number",
             journal,
             query=[
-                Field("task", "integer", "only of this task", False, 1, MAX_TASK_ID),
-                Field("vehicle", "integer", "only of this rover", False, 1, 255),
-                Field("after", "integer", "the first ones after this event", False, 0),
+                Part("task", TASK_ID, "only of this task"),
+                Part("vehicle", VEHICLE_ID, "only of this rover"),
+                Part("after", SINCE, "the first ones after this event"),
                 LIMIT,
             ],
             answer="Entries",

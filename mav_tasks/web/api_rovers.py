@@ -5,15 +5,17 @@ from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
 from mav_tasks.client.aio import Client
-from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
+from mav_tasks.client.fence_form import PLACE, circle_of, polygon_of, shapes_of
+from mav_tasks.client.parts import EPOCH, VEHICLE_ID
 from mav_tasks.errors import MavTasksError, NoSuchVehicle, Refused
 from mav_tasks.plan_files import PlanFile
-from mav_tasks.web.epochs import EPOCH, seen_epoch
-from mav_tasks.web.fields import Field
+from mav_tasks.setting_keys.parts import Part, schema_of
+from mav_tasks.setting_keys.shapes import LARGEST, Flag, Items, Number, Record
+from mav_tasks.web.epochs import seen_epoch
 from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_text import NAME, text_field
+from mav_tasks.web.plan_text import NAME, text_part
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 from mav_tasks.web.stops import Stop
@@ -21,22 +23,15 @@ from mav_tasks.web.users import Line
 
 T = TypeVar("T")
 
-LIMIT = Field("limit", "integer", "at most this many tasks", False, 0, 10_000)
-PLACE = {
-    "type": "object",
-    "properties": {
-        "latitude": {"type": "number", "minimum": -90, "maximum": 90},
-        "longitude": {"type": "number", "minimum": -180, "maximum": 180},
-    },
-    "required": ["latitude", "longitude"],
-}
+LIMIT = Part("limit", Number(0, 10_000, is_whole=True), "at most this many tasks")
+SPOT = schema_of(PLACE) | {"additionalProperties": True}
 FENCE = [
     NAME,
-    text_field("contents of a .plan file with a fence", is_required=False),
-    Field("circle", "object", "stay inside: latitude and longitude (deg) and radius (m)"),
-    Field("polygon", "array", "stay inside: three or more places", False, 3, 500, items=PLACE),
+    text_part("contents of a .plan file with a fence", is_required=False),
+    Part("circle", Record(), "stay inside: latitude and longitude (deg) and radius (m)"),
+    Part("polygon", Items(SPOT, 3, 500), "stay inside: three or more places"),
 ]
-RALLY = [NAME, text_field("contents of a .plan file with rally points")]
+RALLY = [NAME, text_part("contents of a .plan file with rally points")]
 
 
 def operations(services: Services) -> list[Operation]:
@@ -150,8 +145,8 @@ def operations(services: Services) -> list[Operation]:
             "Stop one rover or all at once; no task runs until you resume",
             stop,
             body=[
-                Field("vehicle", "integer", "the rover; all if not given", False, 1, 255),
-                Field("clear", "boolean", "also cancel the waiting tasks"),
+                Part("vehicle", VEHICLE_ID, "the rover; all if not given"),
+                Part("clear", Flag(), "also cancel the waiting tasks"),
             ],
             answer="Stop",
         ),
@@ -168,7 +163,7 @@ def operations(services: Services) -> list[Operation]:
             f"{one}/clear",
             "Cancel the waiting tasks",
             asks(clear),
-            body=[Field("running_too", "boolean", "also cancel the running task")],
+            body=[Part("running_too", Flag(), "also cancel the running task")],
         ),
         Operation("GET", f"{one}/queue", "The queue", queue, query=[LIMIT], answer="Queue"),
         Operation(
@@ -186,7 +181,7 @@ def operations(services: Services) -> list[Operation]:
             f"{one}/track",
             "Where the rover has been while this process ran",
             track,
-            query=[Field("since", "number", "seconds since 1970")],
+            query=[Part("since", Number(0, LARGEST, "s"), "since 1970")],
             answer="Track",
         ),
         Operation("GET", f"{one}/mission", "The staged mission", mission, answer="Path"),

@@ -8,11 +8,13 @@ from importlib.metadata import version
 from starlette.responses import Response, StreamingResponse
 
 from mav_tasks.client.goal_form import KINDS
+from mav_tasks.client.parts import KEY_TEXT
 from mav_tasks.errors import UsageError
 from mav_tasks.mavlink.label import MAX_LABEL
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import Text
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
 from mav_tasks.web.events import description
-from mav_tasks.web.fields import Field
 from mav_tasks.web.guard import UNKNOWN
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import Problem
@@ -21,7 +23,7 @@ from mav_tasks.web.sessions import COOKIE, LASTS
 
 PIECE = 64 * 1024  # bytes that a connection keeps for a reader; others are shared
 CHECKED = 1.0  # s between looks at the key of an open stream
-TOKEN = Field("token", "string", "the token: what 'mav-tasks keys add' printed", True, 1, 200)
+TOKEN = Part("token", KEY_TEXT, "the token: what 'mav-tasks keys add' printed", True)
 
 
 def operations(services: Services) -> list[Operation]:
@@ -47,11 +49,11 @@ def operations(services: Services) -> list[Operation]:
                     "numbers": [
                         {
                             "name": number.name,
-                            "unit": number.unit,
+                            "unit": number.shape.unit,
                             "meaning": number.meaning,
                             "required": number.is_required,
-                            "least": number.least,
-                            "most": number.most,
+                            "least": number.schema.get("minimum"),
+                            "most": number.schema.get("maximum"),
                         }
                         for number in kind.numbers
                     ],
@@ -108,7 +110,7 @@ def operations(services: Services) -> list[Operation]:
             "Changes of rovers, queues, tasks and texts, as server-sent events",
             events,
             answer="Events",
-            headers=[Field("Last-Event-ID", "string", "id of the last event that you got")],
+            headers=[Part("Last-Event-ID", Text("an id"), "id of the last event that you got")],
             description=description(),
         ),
     ]

@@ -5,66 +5,55 @@ from typing import Any
 from starlette.responses import Response
 
 from mav_tasks.client.aio import AnyRover, Client
+from mav_tasks.client.goal_form import goals_of
 from mav_tasks.client.json_form import timing_json
+from mav_tasks.client.parts import (
+    AT,
+    CRON,
+    DEADLINE,
+    DELAY,
+    EPOCH,
+    GOALS,
+    HOW,
+    KEY_TEXT,
+    LABEL,
+    PRIORITY,
+    TASK_OR_NONE,
+)
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import NoSuchVehicle
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import Flag, Number
 from mav_tasks.tasks.repetition import MAX_PERIOD
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_TASK_ID
-from mav_tasks.web.epochs import EPOCH, seen_epoch
-from mav_tasks.web.fields import Field
+from mav_tasks.web.epochs import seen_epoch
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_text import NAME, text_field
+from mav_tasks.web.plan_text import NAME, text_part
 from mav_tasks.web.services import Services
-from mav_tasks.web.submissions import (
-    AT,
-    CRON,
-    DEADLINE,
-    DELAY,
-    GOALS,
-    KEY,
-    LABEL,
-    PRIORITY,
-    TERMS,
-    goals_of,
-    moment_of,
-    repeat_of,
-    submit,
-)
+from mav_tasks.web.submissions import KEY, TERMS, moment_of, repeat_of, submit
 
-assert DEFAULT_PRIORITY == 5, "the API's document says so"
-
-FILE = (NAME, text_field("contents of a .plan or QGC WPL 110 file"))
-KEYED = (Field(KEY, "string", "a text of yours: the same key makes no second task", False, 1, 200),)
+FILE = (NAME, text_part("contents of a .plan or QGC WPL 110 file"))
+KEYED = (Part(KEY, KEY_TEXT, "a text of yours: the same key makes no second task"),)
 CHANGES = (
     PRIORITY,
-    Field("after", "integer", "task that must complete first; 0: none", False, 0, MAX_TASK_ID),
-    Field("before", "integer", "it runs just before this task; 0: last", False, 0, MAX_TASK_ID),
+    Part("after", TASK_OR_NONE, "task that must complete first; 0: none"),
+    Part("before", TASK_OR_NONE, "it runs just before this task; 0: last"),
     DELAY,
     AT,
     DEADLINE,
     LABEL,
-    Field("every", "integer", "repeat: s between starts; 0: do not", False, 0, MAX_PERIOD),
+    Part("every", Number(0, MAX_PERIOD, "s", is_whole=True), "repeat: between starts; 0: do not"),
     CRON,
-    Field("preemptible", "boolean", "other tasks may interrupt it"),
-    Field("preemptive", "boolean", "it may interrupt other tasks"),
+    Part("preemptible", Flag(), "other tasks may interrupt it"),
+    Part("preemptive", Flag(), "it may interrupt other tasks"),
 )
 #: what the path names as the rover, and what it means for a new task
 RUNS_ON = {
     "any": " of the rover that would begin it first; it may get another rover before it begins",
     "{vehicle}": "; answered once the task is durable",
 }
-RELEASE = (
-    Field(
-        "how",
-        "string",
-        "again restarts the task here, remainder finishes it, skip drops it",
-        True,
-        choices=("again", "remainder", "skip"),
-    ),
-    EPOCH,
-)
+RELEASE = (HOW, EPOCH)
 
 
 def _named_by(call: Call) -> int | AnyRover:
@@ -202,8 +191,8 @@ def operations(services: Services) -> list[Operation]:
             "Cancel a task",
             asks(cancel),
             body=[
-                Field("kill", "boolean", "put the rover into HOLD at once"),
-                Field("series", "boolean", "end its series, too: it does not repeat any more"),
+                Part("kill", Flag(), "put the rover into HOLD at once"),
+                Part("series", Flag(), "end its series, too: it does not repeat any more"),
             ],
         ),
         Operation("POST", f"{one}/release", "Release a held task", asks(release), body=RELEASE),

@@ -1,23 +1,23 @@
 """Reads the bodies of requests: large ones in a process of its own, for a STOP must not wait.
 
 A thread is not enough: parsers written in C keep the interpreter's lock until they have finished.
-The process ends with the request, and with it all memory that the request needed. It gets a line of
-JSON, which names the parts, and the body behind it; it answers in JSON.
+The process ends with the request, and with it all memory that the request needed. It gets a line
+that declares the parts, and the body behind it; it answers in JSON.
 """
 
 import asyncio
 import json
 import os
+import pickle
 import subprocess
 import sys
+from base64 import b64decode, b64encode
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
-from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
 from mav_tasks.plan_files.values import FenceCircle, FencePolygon, GeoPoint, PlanFile, PlanItem
-from mav_tasks.web.fields import Field, read_body
+from mav_tasks.setting_keys.parts import Part, read_all, shortened
 from mav_tasks.web.guard import SMALL_BODY
 from mav_tasks.web.plan_text import READINGS, Parts
 from mav_tasks.web.problems import Problem, invalid, problem_of
@@ -30,19 +30,19 @@ COMMAND = (sys.executable, "-m", "mav_tasks.web.bodies")
 _one_at_a_time = asyncio.Lock()
 
 
-async def read(data: bytes, fields: Sequence[Field], reading: str) -> Parts:
+async def read(data: bytes, parts: Sequence[Part], reading: str) -> Parts:
     """Return the declared parts of a body. Raise Problem, or what the reading raises.
 
     ``reading``: the name of one of READINGS.
     """
     if not reading and len(data) <= SMALL_BODY:
-        return _read(data, fields, reading)
+        return _read(data, parts, reading)
     async with _one_at_a_time:
         where = _read if len(data) <= SMALL_BODY else _read_apart
-        return await asyncio.to_thread(where, data, fields, reading)
+        return await asyncio.to_thread(where, data, parts, reading)
 
 
-def _read(data: bytes, fields: Sequence[Field], reading: str) -> Parts:
+def _read(data: bytes, parts: Sequence[Part], reading: str) -> Parts:
     if data.count(b"[") + data.count(b"{") > MOST_PARTS:  # nothing here has so many
         raise Problem(413, "Too large", f"the body has more than {MOST_PARTS} parts")
     try:
@@ -51,7 +51,7 @@ def _read(data: bytes, fields: Sequence[Field], reading: str) -> Parts:
         raise
     except (ValueError, RecursionError) as error:
         raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
-    return READINGS[reading](read_body(fields, value))
+    return READINGS[reading](read_all(parts, value))
 
 
 def _object_of(parts: list[tuple[str, Any]]) -> Parts:
@@ -64,12 +64,12 @@ def _object_of(parts: list[tuple[str, Any]]) -> Parts:
     return found
 
 
-def _read_apart(data: bytes, fields: Sequence[Field], reading: str) -> Parts:
-    head = json.dumps({"fields": [asdict(field) for field in fields], "reading": reading})
+def _read_apart(data: bytes, parts: Sequence[Part], reading: str) -> Parts:
+    head = b64encode(pickle.dumps((parts, reading)))  # to ourselves, so that it can be trusted
     try:
         ended = subprocess.run(
             COMMAND,
-            input=head.encode() + b"\n" + data,
+            input=head + b"\n" + data,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             timeout=WITHIN,
@@ -81,20 +81,20 @@ def _read_apart(data: bytes, fields: Sequence[Field], reading: str) -> Parts:
     answer = json.loads(ended.stdout)
     if answer["problem"] is not None:
         raise Problem(*answer["problem"])
-    parts: Parts = answer["parts"]
-    return parts if answer["plan"] is None else parts | {"plan": _plan_of(answer["plan"])}
+    found: Parts = answer["parts"]
+    return found if answer["plan"] is None else found | {"plan": _plan_of(answer["plan"])}
 
 
 def main() -> None:
     """Read the body on standard input; write its parts, or the parts of its Problem."""
     os.nice(NICE)
-    head = json.loads(sys.stdin.buffer.readline())
+    head = sys.stdin.buffer.readline()
     answer: dict[str, Any] = {"problem": None, "parts": None, "plan": None}
     try:
-        fields = [Field(**each) for each in head["fields"]]
-        parts = _read(sys.stdin.buffer.read(), fields, head["reading"])
-        plan = parts.pop("plan", None)
-        answer |= {"parts": parts, "plan": None if plan is None else _values_of(plan)}
+        parts, reading = pickle.loads(b64decode(head))
+        found = _read(sys.stdin.buffer.read(), parts, reading)
+        plan = found.pop("plan", None)
+        answer |= {"parts": found, "plan": None if plan is None else _values_of(plan)}
     except (MavTasksError, ValueError) as error:
         problem = problem_of(error)
         answer["problem"] = problem.status, problem.title, problem.detail

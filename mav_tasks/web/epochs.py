@@ -8,18 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mav_tasks.client.aio import EPOCHS
-from mav_tasks.web.fields import Field
 from mav_tasks.web.problems import invalid
-
-EPOCH = Field(
-    "epoch",
-    "integer",
-    "halt_epoch that you have seen, of the queue or the task: if anything has halted the rover"
-    " since then, the request is refused (stale)",
-    True,
-    1,
-    (1 << 32) - 1,
-)
 
 
 def seen_epoch(body: Mapping[str, Any]) -> int:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from importlib.metadata import version
 from typing import Any
 
-from mav_tasks.web.fields import Field, body_schema
+from mav_tasks.setting_keys.parts import Part, schema_of
 from mav_tasks.web.operation import ROOT, Operation
 from mav_tasks.web.problems import MEDIA_TYPE
 from mav_tasks.web.schemas import SCHEMAS, ref
@@ -57,8 +57,8 @@ def _described(operation: Operation) -> dict[str, Any]:
         }
         for name in named
     ]
-    parameters += [_parameter(field, "query") for field in operation.query]
-    parameters += [_parameter(field, "header") for field in operation.headers]
+    parameters += [_parameter(part, "query") for part in operation.query]
+    parameters += [_parameter(part, "header") for part in operation.headers]
     described: dict[str, Any] = {
         "operationId": _id_of(operation),
         "summary": operation.summary,
@@ -68,7 +68,11 @@ def _described(operation: Operation) -> dict[str, Any]:
     if operation.description:
         described["description"] = operation.description
     if operation.body is not None:
-        schema = body_schema(operation.body)
+        schema = schema_of(operation.body)
+        for part in operation.body:
+            if not part.is_required:  # null is "not given"
+                named = schema["properties"][part.name]
+                named["type"] = [named["type"], "null"]
         described["requestBody"] = {
             "required": bool(schema["required"]),
             "content": {"application/json": {"schema": schema}},
@@ -90,17 +94,13 @@ def _answers(operation: Operation) -> dict[str, Any]:
     }
 
 
-def _parameter(field: Field, place: str) -> dict[str, Any]:
-    schema = field.schema
-    kinds = schema["type"]
-    schema["type"] = kinds if isinstance(kinds, str) else kinds[0]
-    meaning = schema.pop("description")
+def _parameter(part: Part, place: str) -> dict[str, Any]:
     return {
-        "name": field.name,
+        "name": part.name,
         "in": place,
-        "required": field.is_required,
-        "description": meaning,
-        "schema": schema,
+        "required": part.is_required,
+        "description": part.about,
+        "schema": part.shape.schema(),
     }
 
 

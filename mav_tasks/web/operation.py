@@ -8,12 +8,12 @@ from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from mav_tasks.errors import MavTasksError
+from mav_tasks.errors import MavTasksError, SettingError
+from mav_tasks.setting_keys.parts import Part, shortened
 from mav_tasks.tasks.task import MAX_TASK_ID
 from mav_tasks.web.bodies import read
-from mav_tasks.web.fields import Field
 from mav_tasks.web.identity import LOCAL, Identity
-from mav_tasks.web.problems import invalid, not_found, problem_of
+from mav_tasks.web.problems import not_found, problem_of
 
 ROOT = "/api/v1"
 MAX_VEHICLE = 255  # system ids of MAVLink
@@ -76,11 +76,11 @@ class Operation:
     path: str
     summary: str
     handler: Handler
-    query: Sequence[Field] = ()
-    body: Sequence[Field] | None = None
+    query: Sequence[Part] = ()
+    body: Sequence[Part] | None = None
     answer: str = ""
     status: int = 200
-    headers: Sequence[Field] = ()
+    headers: Sequence[Part] = ()
     description: str = ""
     reading: str = ""
 
@@ -108,18 +108,16 @@ class Operation:
             request.state.identity or LOCAL,  # None: only to log in
             request.state.session,
             request.path_params,
-            {field.name: _queried(field, request.query_params) for field in self.query},
+            {part.name: _queried(part, request.query_params) for part in self.query},
             body,
             request.headers,
         )
 
 
-def _queried(field: Field, query: Mapping[str, str]) -> Any:
-    text = query.get(field.name)
-    if text is None:
-        return None
+def _queried(part: Part, query: Mapping[str, str]) -> Any:
+    text = query.get(part.name)
     try:
-        value: float = int(text) if field.type == "integer" else float(text)
-    except ValueError:
-        raise invalid(f"{field.name} {text[:40]!r}: expected a number") from None
-    return field.read({field.name: value})
+        plain = None if text is None else part.shape.read(text)
+    except SettingError as error:
+        raise SettingError(f"{part.name} {shortened(text)}: {error}") from None
+    return part.read({part.name: plain})

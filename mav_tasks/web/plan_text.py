@@ -8,18 +8,19 @@ from starlette.responses import JSONResponse
 from mav_tasks.errors import PlanFileError
 from mav_tasks.plan_files import PlanFile, parse_plan
 from mav_tasks.services.missions import CAPACITY
-from mav_tasks.web.fields import Field
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import Text
 from mav_tasks.web.plan_preview import preview_of
 
 LONGEST = 6_000_000  # characters; QGroundControl writes some 900 for an item
 MOST_LINES = 200_000  # QGroundControl writes some 30 for an item
 Parts = dict[str, Any]
-NAME = Field("name", "string", "name of the file, for messages", False, 0, 255)
+NAME = Part("name", Text("a name", most=255), "name of the file, for messages")
 
 
-def text_field(meaning: str, *, is_required: bool = True) -> Field:
+def text_part(meaning: str, *, is_required: bool = True) -> Part:
     """Return the part of a request that has a file's text."""
-    return Field("text", "string", meaning, is_required, 1, LONGEST)
+    return Part("text", Text("a file's contents", least=1, most=LONGEST), meaning, is_required)
 
 
 def _with_plan(body: Parts) -> Parts:

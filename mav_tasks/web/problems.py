@@ -12,6 +12,7 @@ from mav_tasks.errors import (
     NoSuchVehicle,
     PlanFileError,
     Refused,
+    SettingError,
     UsageError,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -86,7 +87,7 @@ def problem_of(error: Exception) -> Problem:
             name = reason.name.lower() if reason else None
             words = with_resume(str(error), "press Resume")
             return Problem(status, "The task server refused", words, reason=name)
-        case PlanFileError() | ValueError():
+        case PlanFileError() | SettingError() | ValueError():
             return invalid(str(error))
         case ClientError() | UsageError():  # a connection to the server that cannot be opened
             return Problem(409, "Not done", str(error))

@@ -4,65 +4,22 @@ A single goal is sent as a plan, too: the server compares a whole plan with the 
 same key.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
 from mav_tasks.client.aio import AnyRover, Client
-from mav_tasks.client.goal_form import goal_of, goal_schema
 from mav_tasks.client.handle import Task
 from mav_tasks.client.idempotency import LONGEST, numbers_of
+from mav_tasks.client.parts import AFTER, AT, CRON, DEADLINE, DELAY, EVERY, LABEL, PRIORITY
 from mav_tasks.client.plan_sources import Plan
-from mav_tasks.client.wire import Goal
 from mav_tasks.errors import Refused
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, MIN_PERIOD
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID
-from mav_tasks.web.fields import Field
+from mav_tasks.tasks.task import DEFAULT_PRIORITY
 from mav_tasks.web.problems import Problem, invalid
 
 KEY = "idempotency-key"
-LONGEST_WAIT = 366 * 24 * 3600.0  # s
-
-PRIORITY = Field("priority", "integer", "0 to 10, 10 runs first; 5 if not given", False, 0, 10)
-AFTER = Field("after", "integer", "id of a task that must complete first", False, 1, MAX_TASK_ID)
-DELAY = Field("delay", "number", "start no earlier than in so many seconds", False, 0, LONGEST_WAIT)
-AT = Field("at", "string", "start time, ISO 8601 with a time zone", False, 1, 40)
-DEADLINE = Field(
-    "deadline",
-    "number",
-    "the task expires if it has not started in so many s",
-    False,
-    0,
-    LONGEST_WAIT,
-)
-LABEL = Field("label", "string", "name of the task, at most 24 bytes of UTF-8", False, 0, 24)
-EVERY = Field(
-    "every",
-    "integer",
-    "repeat: s from one start to the next; a deadline counts from each start",
-    False,
-    MIN_PERIOD,
-    MAX_PERIOD,
-)
-CRON = Field(
-    "cron",
-    "string",
-    "repeat: minute, hour, day of month, month, day of week, and perhaps a time zone, else UTC",
-    False,
-    1,
-    MAX_REPEAT,
-)
 TERMS = (PRIORITY, AFTER, DELAY, AT, DEADLINE, LABEL, EVERY, CRON)
-GOALS = Field(
-    "goals", "array", "what to do, in this order, as one task", True, 1, 200, items=goal_schema()
-)
-assert PRIORITY.most == MAX_PRIORITY
-
-
-def goals_of(values: Sequence[Any]) -> list[Goal]:
-    """Return the goals of a request. Raise ValueError, with the part's name, if one is invalid."""
-    return [goal_of(value, f"goals[{at}]") for at, value in enumerate(values)]
 
 
 def moment_of(text: str | None) -> datetime | None:

@@ -28,6 +28,7 @@ from tests.kit.processes import Stand, environment_with, frozen, process, stand,
 
 pytestmark = pytest.mark.slow
 
+TOOLS = json.loads((Path(__file__).parents[1] / "golden/mcp_tools.json").read_text())
 MOVE = {"kind": "move", "distance": 0.4}
 
 
@@ -79,7 +80,7 @@ async def test_stop_ends_the_task_and_only_a_present_epoch_resumes(
         assert "The queue is paused (" in waiting["advice"]
         await it.call("cancel", id=waiting["id"])
         assert "epoch: missing" in await it.refused("resume")
-        assert "epoch: expected at least 1" in await it.refused("resume", epoch=0)
+        assert "epoch 0: not in 1..4294967295" in await it.refused("resume", epoch=0)
         assert await it.refused("resume", epoch=before["halt_epoch"])
         await it.call("resume", epoch=queue["halt_epoch"])
         assert (await it.call("queue"))["paused"] is None
@@ -90,11 +91,11 @@ REFUSED = """submit "goals": [{"kind": "move", "distance": 1e6}], KEY => distanc
 submit "goals": [{"kind": "home"}], "label": "ééééééééééééé", KEY => label
 submit "goals": [{"kind": "home"}] => idempotency_key: missing
 submit "goals": [{"kind": "home"}], "vehicle": 9, KEY => no rover 9
-submit "goals": [], KEY => goals: expected at least 1
+submit "goals": [], KEY => goals []: expected 1 to 100
 submit "goals": [{"kind": "fly"}], KEY => goals[0].kind 'fly'
-submit "goals": [{"kind": "home"}], "start_in": 1e9, KEY => start_in: expected at most
+submit "goals": [{"kind": "home"}], "start_in": 1e9, KEY => start_in 1000000000.0: not in 0
 task "id": 999999.0 => no task 999999
-task "id": true => id True: expected a whole number
+task "id": true => id True: not a number: 1..1065353215
 release "id": 1, "how": "all", "epoch": 1 => how 'all': expected one of again, remainder, skip
 queue "rover": 1 => rover: unknown; expected vehicle, limit"""
 
@@ -107,6 +108,8 @@ async def test_a_refusal_is_the_result_of_a_call_with_its_reason(
     async with agent(running, tmp_path) as it:
         for tool, arguments, words in re.findall(r"(\w+) (.*) => (.*)", calls):
             assert words in await it.refused(tool, **json.loads(f"{{{arguments}}}"))
+        offered = (await it.client.list_tools()).tools
+        assert [each.model_dump(by_alias=True, exclude_none=True) for each in offered] == TOOLS
         with pytest.raises(MCPError, match="no tool 'fly'; there are vehicles"):
             await it.client.call_tool("fly", {})
         assert (await it.call("queue"))["waiting"] == []
