@@ -8,12 +8,6 @@ another story of a seed these figures change: what finds a fault in 24 stories m
 time.
 """
 
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 COMMANDS, VEHICLES = "engine/commands", "engine/vehicles"
 #: name: file, line, what takes its place
 FAULTS: dict[str, tuple[str, str, str]] = {
@@ -90,20 +84,3 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         "pass",
     ),
 }
-
-
-@contextmanager
-def with_fault(name: str, root: Path) -> Iterator[Path]:
-    """Yield a folder with a copy of the product that has a fault."""
-    place, right, wrong = FAULTS[name]
-    with TemporaryDirectory(prefix="fault-") as folder:
-        tree = Path(folder)
-        shutil.copytree(
-            root / "mav_tasks", tree / "mav_tasks", ignore=shutil.ignore_patterns("*.pyc")
-        )
-        file = tree / "mav_tasks" / place
-        text = file.read_text()
-        if text.count(right) != 1:
-            raise SystemExit(f"{name}: {text.count(right)} times in {place}: {right}")
-        file.write_text(text.replace(right, wrong))
-        yield tree
