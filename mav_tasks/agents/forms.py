@@ -1,101 +1,50 @@
-"""The answers of the tools, and their JSON schemas. Pure."""
+"""The answers of the tools, and their JSON schemas."""
 
 import json
-from collections.abc import Mapping, Sequence
-from datetime import datetime
+from collections.abc import Mapping
 from typing import Any
 
 from mav_tasks.agents.advice import advice_of, advice_on_queue
-from mav_tasks.client.descriptions import end_of
-from mav_tasks.client.json_form import history_json, queue_json, task_json
+from mav_tasks.client import json_form
+from mav_tasks.client.json_form import queue_json, task_json
 from mav_tasks.client.values import QueueStatus, TaskStatus
+from mav_tasks.setting_keys.schema import FLAG, TEXT, Schema, an_object, listed, or_null, said
 
-Schema = Mapping[str, Any]
+#: parts of tasks, queues and rovers that agents are told of in advance: each word costs them
+OF_A_TASK = "id vehicle what label state why progress time_to_start time_to_finish halt_epoch"
+OF_A_FINISHED = "id vehicle what label state why ended_at"
+OF_A_QUEUE = "vehicle paused halt_epoch waiting_count capacity"
+OF_A_VEHICLE = (
+    "vehicle kind mode armed heard north east latitude longitude heading speed position_age"
+)
+ADVICE = {"advice": said(TEXT, "what to do now; empty: nothing")}
 
-TEXT: Schema = {"type": "string"}
-WHOLE: Schema = {"type": "integer"}
-YES_OR_NO: Schema = {"type": "boolean"}
-SOME_TEXT: Schema = {"type": ["string", "null"]}
-SOME_WHOLE: Schema = {"type": ["integer", "null"]}
-SOME_NUMBER: Schema = {"type": ["number", "null"]}
-SOME_YES_OR_NO: Schema = {"type": ["boolean", "null"]}
 
-
-def an_object(**properties: Schema) -> dict[str, Any]:
-    """Return the schema of an object with these properties, and maybe others."""
-    return {
-        "type": "object",
-        "properties": {name: dict(each) for name, each in properties.items()},
-        "required": list(properties),
+def _some(parts: json_form.Parts, names: str, more: Mapping[str, Schema]) -> Schema:
+    """Return the schema of an object with some parts, without the lists of their words."""
+    schemas = ((name, parts[name][1]) for name in names.split())
+    brief = {
+        name: {key: value for key, value in schema.items() if key != "enum"}
+        for name, schema in schemas
     }
+    return an_object(brief | dict(more))
 
 
-def a_list(of: Schema) -> dict[str, Any]:
-    """Return the schema of a list."""
-    return {"type": "array", "items": dict(of)}
-
-
-def described(schema: Schema, words: str) -> dict[str, Any]:
-    """Return a schema with a description."""
-    return {**schema, "description": words}
-
-
-TASK = an_object(
-    id=WHOLE,
-    vehicle=WHOLE,
-    what=TEXT,
-    label=SOME_TEXT,
-    state=TEXT,
-    why=described(SOME_TEXT, "why it is in this state"),
-    is_over=described(YES_OR_NO, "whether it has ended, completed or not"),
-    advice=described(TEXT, "what to do now; empty: nothing"),
-    progress=described(SOME_NUMBER, "0 to 1"),
-    time_to_start=described(SOME_NUMBER, "s"),
-    time_to_finish=described(SOME_NUMBER, "s"),
-    halt_epoch=described(WHOLE, "the epoch for resume and release"),
+IS_OVER = {"is_over": said(FLAG, "whether it has ended, completed or not")}
+TASK = _some(json_form.TASK, OF_A_TASK, IS_OVER | ADVICE)
+FINISHED = _some(json_form.TASK, OF_A_FINISHED, {})
+QUEUE = _some(
+    json_form.QUEUE, OF_A_QUEUE, {"current": or_null(TASK), "waiting": listed(TASK)} | ADVICE
 )
-FINISHED = an_object(
-    id=WHOLE,
-    vehicle=WHOLE,
-    what=TEXT,
-    label=SOME_TEXT,
-    state=TEXT,
-    why=SOME_TEXT,
-    ended_at=SOME_TEXT,
-)
-QUEUE = an_object(
-    vehicle=WHOLE,
-    paused=described(SOME_TEXT, "why no task runs until resume; null: it is not paused"),
-    halt_epoch=described(WHOLE, "the epoch for resume and release"),
-    advice=described(TEXT, "what to do now; empty: nothing"),
-    current={"anyOf": [TASK, {"type": "null"}]},
-    waiting=a_list(TASK),
-    waiting_count=WHOLE,
-    capacity=WHOLE,
-)
-VEHICLE = an_object(
-    vehicle=WHOLE,
-    kind=TEXT,
-    mode=TEXT,
-    armed=SOME_YES_OR_NO,
-    heard=described(YES_OR_NO, "whether the rover is heard now"),
-    north=described(SOME_NUMBER, "m from the origin of its local frame"),
-    east=described(SOME_NUMBER, "m from the origin of its local frame"),
-    latitude=SOME_NUMBER,
-    longitude=SOME_NUMBER,
-    heading=described(SOME_NUMBER, "degrees, clockwise from north"),
-    speed=described(SOME_NUMBER, "m/s"),
-)
-DONE = an_object(done=described(TEXT, "what was done"))
+VEHICLE = _some(json_form.VEHICLE, OF_A_VEHICLE, {})
+DONE = an_object({"done": said(TEXT, "what was done")})
 
 
 def task_form(status: TaskStatus) -> dict[str, Any]:
     """Return a task, with what an agent can do about it."""
     return task_json(status) | {
-        "why": end_of(status) or None,
         "is_over": status.is_over,
         "advice": advice_of(status),
-        "halt_epoch": status.halt_epoch,
     }
 
 
@@ -107,11 +56,6 @@ def queue_form(queue: QueueStatus) -> dict[str, Any]:
     current = None if queue.current is None else task_form(queue.current)
     advice = advice_on_queue(queue)
     return form | {"current": current, "waiting": waiting, "advice": advice}
-
-
-def history_form(tasks: Sequence[TaskStatus], *, now: datetime) -> dict[str, Any]:
-    """Return finished tasks, newest first."""
-    return {"tasks": [history_json(each, now=now) for each in tasks]}
 
 
 def result(form: Mapping[str, Any], *, is_error: bool = False) -> dict[str, Any]:

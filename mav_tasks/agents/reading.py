@@ -1,7 +1,6 @@
 """The tools that change nothing: vehicles, queue, history, task, wait."""
 
 import asyncio
-from datetime import UTC, datetime
 from typing import Any
 
 from mav_tasks.agents.forms import (
@@ -9,9 +8,6 @@ from mav_tasks.agents.forms import (
     QUEUE,
     TASK,
     VEHICLE,
-    a_list,
-    an_object,
-    history_form,
     queue_form,
     task_form,
 )
@@ -19,10 +15,11 @@ from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
 from mav_tasks.client.descriptions import needs_decision, state_of, what_of, why_of
 from mav_tasks.client.handle import Task
-from mav_tasks.client.json_form import vehicle_json
+from mav_tasks.client.json_form import task_json, vehicle_json
 from mav_tasks.client.parts import TASK_ID, VEHICLE_ID
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.schema import an_object, listed
 from mav_tasks.setting_keys.shapes import Number
 
 LONGEST_WAIT = 300  # s
@@ -52,7 +49,7 @@ async def _history(rovers: Rovers, values: Values, _report: Report) -> dict[str,
     vehicle = await rovers.vehicle(values["vehicle"])
     client = await rovers.client()
     tasks = await client.history(vehicle=vehicle, limit=_limit(values))
-    return history_form(tasks, now=datetime.now(UTC))
+    return {"tasks": [task_json(each) for each in tasks]}
 
 
 async def _task(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
@@ -102,7 +99,7 @@ READING = (
         "Show the rovers: position, heading, mode, whether each is armed and heard. Read this "
         "first. A rover that is not heard cannot be driven now.",
         (),
-        an_object(vehicles=a_list(VEHICLE)),
+        an_object({"vehicles": listed(VEHICLE)}),
         _vehicles,
         is_reading=True,
     ),
@@ -121,7 +118,7 @@ READING = (
         "Finished tasks",
         "List finished tasks of a rover, newest first: how each ended, why and when.",
         (ROVER, LIMIT),
-        an_object(tasks=a_list(FINISHED)),
+        an_object({"tasks": listed(FINISHED)}),
         _history,
         is_reading=True,
     ),

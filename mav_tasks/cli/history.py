@@ -9,7 +9,7 @@ from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import opened
-from mav_tasks.client.json_form import history_json
+from mav_tasks.client.json_form import task_json
 from mav_tasks.client.values import TaskStatus
 
 
@@ -28,20 +28,20 @@ async def history(
     async with opened(common) as client:
         rovers = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
         found = {rover: await client.history(vehicle=rover, limit=limit) for rover in rovers}
-    now = datetime.now().astimezone()
     for rover, tasks in found.items():
-        _show(rover, tasks, now=now, as_json=common.json)
+        _show(rover, tasks, as_json=common.json)
 
 
-def _show(rover: int, tasks: tuple[TaskStatus, ...], *, now: "datetime", as_json: bool) -> None:
+def _show(rover: int, tasks: tuple[TaskStatus, ...], *, as_json: bool) -> None:
     if as_json:
         for each in tasks:
-            output.say_json(history_json(each, now=now))
+            output.say_json(task_json(each))
         return
     from mav_tasks.cli.tables import history_table  # noqa: PLC0415
 
     output.say(f"rover {rover}: {_headline(len(tasks))}")
     if tasks:
+        now = datetime.now().astimezone()
         output.show(history_table(tasks, now=now, width=output.console().width))
 
 

@@ -1,113 +1,221 @@
-"""Tasks, queues and rovers as JSON: the form of the command line, the HTTP API and agents. Pure.
+"""Tasks, queues and rovers as JSON: the form of the command line, the HTTP API and agents.
 
-Angles are in degrees here. Unknown values are null.
+Each part is declared once: its name, where it comes from, its schema. Angles are in degrees here.
+Unknown values are null.
 """
 
-from datetime import datetime, timedelta
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime, timedelta
 from math import degrees, inf
+from operator import attrgetter
 from typing import Any
 
 from mav_tasks.client.descriptions import end_of, left, state_of, waits_of, what_of
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, VehicleStatus
+from mav_tasks.setting_keys.schema import (
+    FLAG,
+    INTEGER,
+    NUMBER,
+    TEXT,
+    Schema,
+    listed,
+    or_null,
+    ref,
+    said,
+    words,
+)
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+
+Form = dict[str, Any]
+#: by name: what returns the part of a value, and its schema
+Parts = Mapping[str, tuple[Callable[[Any], Any], Schema]]
+
+REASON = words([reason.name.lower() for reason in TaskReason])
+SECONDS = or_null(NUMBER, "s")
 
 
-def task_json(status: TaskStatus) -> dict[str, Any]:
-    """Return a task as JSON; unknown values are null."""
-    amount, unit = left(status)
-    return {
-        "id": status.id,
-        "vehicle": status.vehicle,
-        "what": what_of(status),
-        "label": status.label or None,
-        "command": status.command,
-        "state": state_of(status),
-        "reason": status.reason.name.lower() if status.reason else None,
-        "priority": status.priority,
-        "after": status.after or None,
-        "every": status.every if isinstance(status.every, int) else None,
-        "cron": status.every if isinstance(status.every, str) else None,
-        "series": status.series,
-        "position": status.position,
-        "progress": status.progress,
-        "left": _rounded(amount),
-        "left_unit": unit,
-        "item": status.item,
-        "items": status.items,
-        "time_to_start": _rounded(status.time_to_start),
-        "time_to_finish": _rounded(status.time_to_finish),
-        "execution_time": _rounded(status.execution_time),
-        "nonce": status.nonce or None,
-        "submitter": status.submitter,
-        "version": status.version,
-    }
+def form_of(parts: Parts, value: object) -> Form:
+    """Return a value as JSON."""
+    return {name: of(value) for name, (of, _) in parts.items()}
 
 
-def history_json(status: TaskStatus, *, now: datetime) -> dict[str, Any]:
-    """Return a finished task as JSON, with the time of its end."""
-    ago = status.ended_ago
-    ended_at = None if ago is None else now - timedelta(seconds=ago)
-    return task_json(status) | {
-        "why": end_of(status) or None,
-        "ended_ago": _rounded(ago),
-        "ended_at": None if ended_at is None else ended_at.isoformat(timespec="seconds"),
-    }
+def schemas_of(parts: Parts) -> dict[str, Schema]:
+    """Return the schema of each part."""
+    return {name: schema for name, (_, schema) in parts.items()}
 
 
-def queue_json(queue: QueueStatus) -> dict[str, Any]:
-    waits = waits_of(queue)
-    return {
-        "vehicle": queue.vehicle,
-        "running": queue.running,
-        "next": queue.next,
-        "paused": None if queue.paused is None else queue.paused.name.lower(),
-        "halt_epoch": queue.halt_epoch,
-        "heartbeat_age": _age(queue.heartbeat_age),
-        "gateway": queue.gateway or None,
-        "shares_id": queue.shares_id,
-        "waiting_count": queue.waiting_count,
-        "capacity": queue.capacity,
-        "counts": {state.name.lower(): count for state, count in queue.counts.items()},
-        "current": None if queue.current is None else task_json(queue.current),
-        "waiting": [task_json(each) | {"why": waits[each.id] or None} for each in queue.waiting],
-    }
+def _given(name: str) -> Callable[[Any], Any]:
+    """Return what reads an attribute; null instead of 0 and ""."""
+    return lambda value: getattr(value, name) or None
 
 
-def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
-    heading = None if vehicle.yaw is None else round(degrees(vehicle.yaw), 4) % 360.0
-    return {
-        "vehicle": vehicle.id,
-        "kind": vehicle.kind,
-        "mode": vehicle.mode,
-        "armed": vehicle.armed,
-        "heard": vehicle.is_heard,
-        "heartbeat_age": _age(vehicle.heartbeat_age),
-        "north": _rounded(vehicle.north),
-        "east": _rounded(vehicle.east),
-        "heading": _rounded(heading),
-        "speed": _rounded(vehicle.speed),
-        "latitude": vehicle.latitude,
-        "longitude": vehicle.longitude,
-        "position_age": _rounded(vehicle.position_age),
-        "battery": vehicle.battery,
-        "voltage": vehicle.voltage,
-        "ready": vehicle.is_ready,
-        "server_component": vehicle.server_component,
-    }
+def _number(name: str) -> Callable[[Any], float | None]:
+    return lambda value: _rounded(getattr(value, name))
 
 
-def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
-    """Return the timing as JSON, in seconds; null if it is unknown."""
-    if timing is None:
+def _of_type(name: str, kind: type) -> Callable[[Any], Any]:
+    return lambda value: found if isinstance(found := getattr(value, name), kind) else None
+
+
+def _ended_at(status: TaskStatus) -> str | None:
+    if status.ended_ago is None:
         return None
-    names = ("rate", "count", "p50", "p99", "max", "late")
-    return {name: _rounded(getattr(timing, name)) for name in names}
+    at = datetime.now(UTC) - timedelta(seconds=status.ended_ago)
+    return at.isoformat(timespec="milliseconds")
 
 
-def _age(heartbeat_age: float | None) -> float | None:
+def _age(value: QueueStatus | VehicleStatus) -> float | None:
     """Return an age for JSON: null also if there was no heartbeat."""
-    return None if heartbeat_age in (None, inf) else _rounded(heartbeat_age)
+    return None if value.heartbeat_age in (None, inf) else _rounded(value.heartbeat_age)
+
+
+def _heading(vehicle: VehicleStatus) -> float | None:
+    return None if vehicle.yaw is None else _rounded(round(degrees(vehicle.yaw), 4) % 360.0)
 
 
 def _rounded(value: float | None) -> float | None:
     """Return a number rounded to 4 decimals, without the noise of a float32."""
     return None if value is None else round(value, 4)
+
+
+TASK: Parts = {
+    "id": (attrgetter("id"), INTEGER),
+    "vehicle": (attrgetter("vehicle"), INTEGER),
+    "what": (what_of, TEXT),
+    "label": (_given("label"), or_null(TEXT)),
+    "command": (attrgetter("command"), INTEGER),
+    "state": (state_of, words([state.name.lower() for state in TaskState])),
+    "reason": (
+        lambda status: status.reason.name.lower() if status.reason else None,
+        or_null(REASON),
+    ),
+    "why": (
+        lambda status: end_of(status) or None,
+        or_null(TEXT, "why it is in its state, in words"),
+    ),
+    "priority": (attrgetter("priority"), INTEGER),
+    "after": (_given("after"), or_null(INTEGER)),
+    "every": (
+        _of_type("every", int),
+        or_null(INTEGER, "it repeats: s from one start to the next"),
+    ),
+    "cron": (
+        _of_type("every", str),
+        or_null(TEXT, "it repeats: a cron expression, perhaps with a time zone, else UTC"),
+    ),
+    "series": (attrgetter("series"), or_null(INTEGER, "id of the first run of its series")),
+    "position": (attrgetter("position"), or_null(INTEGER, "number of tasks that run before it")),
+    "progress": (attrgetter("progress"), or_null(NUMBER, "0 to 1")),
+    "left": (
+        lambda status: _rounded(left(status)[0]),
+        or_null(NUMBER, "what is left of it"),
+    ),
+    "left_unit": (
+        lambda status: left(status)[1],
+        or_null(TEXT, "unit of that: m, deg, s or items"),
+    ),
+    "item": (attrgetter("item"), INTEGER),
+    "items": (attrgetter("items"), INTEGER),
+    "time_to_start": (_number("time_to_start"), SECONDS),
+    "time_to_finish": (_number("time_to_finish"), SECONDS),
+    "execution_time": (_number("execution_time"), SECONDS),
+    "nonce": (_given("nonce"), or_null(INTEGER)),
+    "submitter": (
+        attrgetter("submitter"),
+        said(TEXT, "system and component id of who submitted it"),
+    ),
+    "version": (attrgetter("version"), INTEGER),
+    "halt_epoch": (
+        attrgetter("halt_epoch"),
+        said(INTEGER, "the present one of its rover, to be sent with a release; 0: not known"),
+    ),
+    "ended_ago": (_number("ended_ago"), SECONDS),
+    "ended_at": (_ended_at, or_null(TEXT, "ISO 8601")),
+}
+QUEUE: Parts = {
+    "vehicle": (attrgetter("vehicle"), INTEGER),
+    "running": (attrgetter("running"), or_null(INTEGER, "id of the running task")),
+    "next": (attrgetter("next"), or_null(INTEGER, "id of the task that runs next")),
+    "paused": (
+        lambda queue: None if queue.paused is None else queue.paused.name.lower(),
+        or_null(REASON, "why it is paused; null: it is not"),
+    ),
+    "halt_epoch": (
+        attrgetter("halt_epoch"),
+        said(INTEGER, "grows with each event that halts the rover"),
+    ),
+    "heartbeat_age": (_age, or_null(NUMBER, "s since the rover's heartbeat")),
+    "gateway": (_given("gateway"), or_null(TEXT, "gateway of a fleet that has the rover")),
+    "shares_id": (
+        attrgetter("shares_id"),
+        said(FLAG, "another rover has the same system id; it is ignored"),
+    ),
+    "waiting_count": (attrgetter("waiting_count"), said(INTEGER, "number of waiting tasks")),
+    "capacity": (
+        attrgetter("capacity"),
+        said(INTEGER, "number of waiting tasks that there may be"),
+    ),
+    "counts": (
+        lambda queue: {state.name.lower(): count for state, count in queue.counts.items()},
+        {
+            "type": "object",
+            "description": "number of tasks in each state",
+            "additionalProperties": INTEGER,
+        },
+    ),
+    "current": (
+        lambda queue: None if queue.current is None else task_json(queue.current),
+        or_null(ref("Task")),
+    ),
+    "waiting": (
+        lambda queue: [
+            task_json(each) | {"why": why or None}
+            for each, why in zip(queue.waiting, waits_of(queue).values(), strict=True)
+        ],
+        said(listed(ref("Task")), "in the order in which they run"),
+    ),
+}
+VEHICLE: Parts = {
+    "vehicle": (attrgetter("id"), said(INTEGER, "system id of the rover")),
+    "kind": (attrgetter("kind"), said(TEXT, "ardupilot, px4, other or unknown")),
+    "mode": (attrgetter("mode"), TEXT),
+    "armed": (attrgetter("armed"), or_null(FLAG)),
+    "heard": (attrgetter("is_heard"), said(FLAG, "its heartbeats arrive")),
+    "heartbeat_age": (_age, SECONDS),
+    "north": (_number("north"), or_null(NUMBER, "m north of its local origin")),
+    "east": (_number("east"), or_null(NUMBER, "m east of it")),
+    "heading": (_heading, or_null(NUMBER, "deg clockwise from north")),
+    "speed": (_number("speed"), or_null(NUMBER, "m/s")),
+    "latitude": (attrgetter("latitude"), or_null(NUMBER, "deg")),
+    "longitude": (attrgetter("longitude"), or_null(NUMBER, "deg")),
+    "position_age": (_number("position_age"), or_null(NUMBER, "s since its position arrived")),
+    "battery": (attrgetter("battery"), or_null(NUMBER, "0 to 1")),
+    "voltage": (attrgetter("voltage"), or_null(NUMBER, "V")),
+    "ready": (attrgetter("is_ready"), or_null(FLAG, "its checks before arming pass")),
+    "server_component": (attrgetter("server_component"), INTEGER),
+}
+TIMING: Parts = {
+    "rate": (_number("rate"), said(NUMBER, "Hz")),
+    "count": (attrgetter("count"), INTEGER),
+    "p50": (_number("p50"), SECONDS),
+    "p99": (_number("p99"), SECONDS),
+    "max": (_number("max"), SECONDS),
+    "late": (attrgetter("late"), INTEGER),
+}
+
+
+def task_json(status: TaskStatus) -> Form:
+    return form_of(TASK, status)
+
+
+def queue_json(queue: QueueStatus) -> Form:
+    return form_of(QUEUE, queue)
+
+
+def vehicle_json(vehicle: VehicleStatus) -> Form:
+    return form_of(VEHICLE, vehicle)
+
+
+def timing_json(timing: TaskTiming | None) -> Form | None:
+    """Return the timing as JSON, in seconds; null if it is unknown."""
+    return None if timing is None else form_of(TIMING, timing)

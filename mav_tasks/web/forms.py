@@ -1,12 +1,10 @@
 """Rovers, queues and tasks as the API and the page show them: JSON with words for people. Pure."""
 
 from collections.abc import Iterable, Mapping
-from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from mav_tasks.client.descriptions import (
     UNTIL_RESUMED,
-    end_of,
     needs_decision,
     remedy_for,
     remedy_for_pause,
@@ -43,16 +41,11 @@ def task_form(
 
     ``user``: of the page, who submitted it; "": not known.
     """
-    words = why if why is not None else end_of(status)
-    ago = status.ended_ago
-    ended = None if ago is None else datetime.now(UTC) - timedelta(seconds=ago)
-    return task_json(status) | {
-        "why": words or None,
+    form = task_json(status)
+    return form | {
+        "why": form["why"] if why is None else why or None,
         "remedy": remedy_of(status),
         "submitted_by": user or who_is(status.submitter),
-        "halt_epoch": status.halt_epoch,
-        "ended_ago": None if ago is None else round(ago, 3),
-        "ended_at": None if ended is None else ended.isoformat(timespec="milliseconds"),
         "goals": (goals or {}).get(status.id),
     }
 

@@ -1,54 +1,19 @@
 """The JSON schemas of the API's answers, as ``forms`` and the handlers make them."""
 
-from collections.abc import Mapping
-from typing import Any
-
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-
-Schema = dict[str, Any]
-
-NUMBER: Schema = {"type": "number"}
-INTEGER: Schema = {"type": "integer"}
-TEXT: Schema = {"type": "string"}
-FLAG: Schema = {"type": "boolean"}
-REASON: Schema = {"type": "string", "enum": [reason.name.lower() for reason in TaskReason]}
-
-
-def ref(name: str) -> Schema:
-    """Return a reference to a schema of this document."""
-    return {"$ref": f"#/components/schemas/{name}"}
-
-
-def or_null(schema: Schema, meaning: str = "") -> Schema:
-    """Return the schema of a value that may be unknown."""
-    if "$ref" in schema:
-        return {"anyOf": [schema, {"type": "null"}]} | ({"description": meaning} if meaning else {})
-    found = dict(schema) | {"type": [schema["type"], "null"]}
-    if "enum" in schema:
-        found["enum"] = [*schema["enum"], None]
-    return said(found, meaning)
-
-
-def said(schema: Schema, meaning: str) -> Schema:
-    """Return a schema with its meaning."""
-    return schema | ({"description": meaning} if meaning else {})
-
-
-def listed(schema: Schema) -> Schema:
-    """Return the schema of a list."""
-    return {"type": "array", "items": schema}
-
-
-def whole(parts: Mapping[str, Schema], *, optional: tuple[str, ...] = ()) -> Schema:
-    """Return the schema of an object with exactly these parts."""
-    required = [name for name in parts if name not in optional]
-    return {
-        "type": "object",
-        "properties": dict(parts),
-        "required": required,
-        "additionalProperties": False,
-    }
-
+from mav_tasks.client.json_form import QUEUE, TASK, TIMING, VEHICLE, schemas_of
+from mav_tasks.setting_keys.schema import (
+    FLAG,
+    INTEGER,
+    NUMBER,
+    TEXT,
+    Schema,
+    listed,
+    or_null,
+    ref,
+    said,
+    whole,
+    words,
+)
 
 MAYBE = or_null(NUMBER)
 PLACE = whole(
@@ -61,101 +26,44 @@ PLACE = whole(
     optional=("north", "east", "latitude", "longitude"),
 )
 
-VEHICLE = whole(
-    {
-        "vehicle": said(INTEGER, "system id of the rover"),
-        "kind": said(TEXT, "ardupilot, px4, other or unknown"),
-        "mode": TEXT,
-        "armed": or_null(FLAG),
-        "heard": said(FLAG, "its heartbeats arrive"),
-        "heartbeat_age": or_null(NUMBER, "s"),
-        "data_age": or_null(NUMBER, "s since its position arrived"),
-        "north": or_null(NUMBER, "m north of its local origin"),
-        "east": or_null(NUMBER, "m east of it"),
-        "heading": or_null(NUMBER, "deg clockwise from north"),
-        "speed": or_null(NUMBER, "m/s"),
-        "latitude": or_null(NUMBER, "deg"),
-        "longitude": or_null(NUMBER, "deg"),
+#: parts of a rover that the page has in another form
+OTHERWISE = ("position_age", "battery", "voltage")
+A_VEHICLE = whole(
+    {name: part for name, part in schemas_of(VEHICLE).items() if name not in OTHERWISE}
+    | {
+        "data_age": VEHICLE["position_age"][1],
         "battery": or_null(ref("Battery")),
-        "ready": or_null(FLAG, "its checks before arming pass"),
         "prearm": said(listed(TEXT), "what those checks reported lately"),
         "control": said(
-            {"type": "string", "enum": ["tasks", "paused", "taken over", "stopped", "silent"]},
-            "what controls it",
+            words(("tasks", "paused", "taken over", "stopped", "silent")), "what controls it"
         ),
         "control_words": TEXT,
         "goal": or_null(ref("Place")),
         "origin": or_null(ref("Place"), "origin of its local frame"),
-        "server_component": INTEGER,
     }
 )
-TASK = whole(
-    {
-        "id": INTEGER,
-        "vehicle": INTEGER,
-        "what": TEXT,
-        "label": or_null(TEXT),
-        "every": or_null(INTEGER, "it repeats: s from one start to the next"),
-        "cron": or_null(TEXT, "it repeats: a cron expression, perhaps with a time zone, else UTC"),
-        "series": or_null(INTEGER, "id of the first run of its series"),
-        "command": INTEGER,
-        "state": {"type": "string", "enum": [state.name.lower() for state in TaskState]},
-        "reason": or_null(REASON),
-        "why": or_null(TEXT, "why it is in its state, in words"),
+A_TASK = whole(
+    schemas_of(TASK)
+    | {
         "remedy": or_null(ref("Remedy"), "what the user can do about it"),
-        "priority": INTEGER,
-        "after": or_null(INTEGER),
-        "position": or_null(INTEGER, "number of tasks that run before it"),
-        "progress": or_null(NUMBER, "0 to 1"),
-        "left": or_null(NUMBER, "what is left of it"),
-        "left_unit": or_null(TEXT, "unit of that: m, deg, s or items"),
-        "item": INTEGER,
-        "items": INTEGER,
-        "time_to_start": or_null(NUMBER, "s"),
-        "time_to_finish": or_null(NUMBER, "s"),
-        "execution_time": or_null(NUMBER, "s"),
-        "nonce": or_null(INTEGER),
         "submitted_by": said(TEXT, "who submitted it, in words"),
-        "submitter": said(TEXT, "system and component id of who submitted it"),
-        "version": INTEGER,
-        "halt_epoch": said(
-            INTEGER, "the present one of its rover, to be sent with a release; 0: not known"
-        ),
-        "ended_ago": or_null(NUMBER, "s"),
-        "ended_at": or_null(TEXT, "ISO 8601"),
-        "goals": {
-            "anyOf": [listed(ref("Place")), {"type": "null"}],
-            "description": "places that it drives to; null: not known; empty: many, which only"
+        "goals": said(
+            {"anyOf": [listed(ref("Place")), {"type": "null"}]},
+            "places that it drives to; null: not known; empty: many, which only"
             " the answer to GET /tasks/{task} has",
-        },
+        ),
     }
 )
-QUEUE = whole(
-    {
-        "vehicle": INTEGER,
-        "running": or_null(INTEGER, "id of the running task"),
-        "next": or_null(INTEGER, "id of the task that runs next"),
-        "paused": or_null(REASON, "why it is paused; null: it is not"),
+A_QUEUE = whole(
+    schemas_of(QUEUE)
+    | {
         "paused_words": or_null(TEXT),
         "paused_remedy": or_null(TEXT, "what a person can do about it"),
-        "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
-        "heartbeat_age": or_null(NUMBER, "s since the rover's heartbeat"),
-        "shares_id": said(FLAG, "another rover has the same system id; it is ignored"),
-        "gateway": or_null(TEXT, "gateway of a fleet that has the rover"),
-        "waiting_count": said(INTEGER, "number of waiting tasks"),
-        "capacity": said(INTEGER, "number of waiting tasks that there may be"),
-        "counts": {
-            "type": "object",
-            "description": "number of tasks in each state",
-            "additionalProperties": INTEGER,
-        },
-        "current": or_null(ref("Task")),
-        "waiting": said(listed(ref("Task")), "in the order in which they run"),
         "more": said(INTEGER, "waiting tasks that are not listed"),
     }
 )
 QUEUE_CHANGE = whole(
-    {name: part for name, part in QUEUE["properties"].items() if name != "waiting"}
+    {name: part for name, part in A_QUEUE["properties"].items() if name != "waiting"}
     | {
         "order": {
             "type": "array",
@@ -173,7 +81,7 @@ QUEUE_CHANGE = whole(
 )
 SHAPE = whole(
     {
-        "kind": {"type": "string", "enum": ["polygon", "circle"]},
+        "kind": words(("polygon", "circle")),
         "inclusion": FLAG,
         "points": listed(ref("Place")),
         "centre": ref("Place"),
@@ -187,10 +95,7 @@ STOP = whole(
         "at": said(NUMBER, "seconds since 1970"),
         "vehicle": or_null(INTEGER, "null: all rovers"),
         "by": TEXT,
-        "phase": {
-            "type": "string",
-            "enum": ["sent", "acknowledged", "standing", "refused", "unanswered"],
-        },
+        "phase": words(("sent", "acknowledged", "standing", "refused", "unanswered")),
         "acknowledged_after": or_null(NUMBER, "s"),
         "standing_after": or_null(NUMBER, "s"),
         "detail": or_null(TEXT),
@@ -238,15 +143,15 @@ SCHEMAS: dict[str, Schema] = {
     "Battery": whole({"percent": or_null(INTEGER), "voltage": or_null(NUMBER, "V")}),
     "Remedy": whole(
         {
-            "action": {"type": "string", "enum": ["resume", "release", "none"]},
+            "action": words(("resume", "release", "none")),
             "words": TEXT,
         }
     ),
-    "Vehicle": VEHICLE,
+    "Vehicle": A_VEHICLE,
     "Vehicles": whole({"vehicles": listed(ref("Vehicle"))}),
-    "Task": TASK,
+    "Task": A_TASK,
     "Tasks": whole({"tasks": listed(ref("Task"))}),
-    "Queue": QUEUE,
+    "Queue": A_QUEUE,
     "QueueChange": QUEUE_CHANGE,
     "Snapshot": whole(
         {
@@ -296,16 +201,7 @@ SCHEMAS: dict[str, Schema] = {
             "rally": listed(ref("Place")),
         }
     ),
-    "Timing": whole(
-        {
-            "rate": said(NUMBER, "Hz"),
-            "count": INTEGER,
-            "p50": or_null(NUMBER, "s"),
-            "p99": or_null(NUMBER, "s"),
-            "max": or_null(NUMBER, "s"),
-            "late": INTEGER,
-        }
-    ),
+    "Timing": whole(schemas_of(TIMING)),
     "Entries": {
         "type": "object",
         "properties": {
@@ -363,7 +259,7 @@ SCHEMAS: dict[str, Schema] = {
                     {
                         "at": NUMBER,
                         "words": TEXT,
-                        "kind": {"type": "string", "enum": ["event", "text"]},
+                        "kind": words(("event", "text")),
                         "vehicle": or_null(INTEGER),
                         "task": or_null(INTEGER),
                     }
