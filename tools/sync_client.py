@@ -111,24 +111,16 @@ def _annotation(annotation: ast.expr | None, kind: str) -> str:
 
 
 def _arguments(call: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
-    arguments = [_argument(each) for each in call.args.args[1:]]
-    arguments += [f"{each.arg}={_argument(each)}" for each in call.args.kwonlyargs]
+    arguments = [each.arg for each in call.args.args[1:]]
+    arguments += [f"{each.arg}={each.arg}" for each in call.args.kwonlyargs]
+    arguments += [f"**{call.args.kwarg.arg}"] if call.args.kwarg else []
     return ", ".join(arguments)
-
-
-def _argument(parameter: ast.arg) -> str:
-    assert parameter.annotation is not None
-    kinds = ast.unparse(parameter.annotation).strip("'").split(" | ")
-    if "Task" not in kinds:
-        return parameter.arg
-    bare = f"id_of({parameter.arg})"
-    return f"None if {parameter.arg} is None else {bare}" if "None" in kinds else bare
 
 
 def _imports(code: str, sources: Mapping[str, ast.Module]) -> str:
     """Return the imports of the names in the code, from the same modules as in the sources."""
     homes = dict.fromkeys(("BlockingClient", "BlockingTask", "Portal"), "mav_tasks.client.blocking")
-    homes |= dict.fromkeys(("called", "id_of"), "mav_tasks.client.blocking")
+    homes |= {"called": "mav_tasks.client.blocking"}
     homes["Iterator"] = "collections.abc"
     for module, source in sources.items():
         for node in source.body:

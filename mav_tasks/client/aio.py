@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from datetime import datetime
 from math import nan
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Self, Unpack
 from weakref import WeakValueDictionary
 
 from mav_tasks import plan_files
@@ -19,6 +19,7 @@ from mav_tasks.client.plan_sources import Plan, file_of, items_of
 from mav_tasks.client.session import TELEMETRY_RATE, Session
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.client.submissions import Submissions, utc_of
+from mav_tasks.client.terms import AnyRover, Changes, Numbered, Terms, id_of
 from mav_tasks.client.values import (
     News,
     QueueStatus,
@@ -67,10 +68,17 @@ EPOCHS = 1 << 24  # integers that a float32 holds exactly
 PAGE = 16  # tasks that one request returns
 NO_HISTORY = "the server does not list finished tasks: it is older than this client"
 OVERTAKEN = "a later STOP or pause overtook this request: repeat it if you still mean it"
-#: in place of a rover: the server chooses one
-AnyRover = Literal["any"]
-
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
+#: what is changed by a number, in the order in which it is sent
+PROPERTIES = {
+    "priority": TaskProperty.PRIORITY,
+    "deadline": TaskProperty.DEADLINE,
+    "after": TaskProperty.RUN_AFTER,
+    "before": TaskProperty.RUN_BEFORE,
+    "preemptible": TaskProperty.PREEMPTIBLE,
+    "preemptive": TaskProperty.PREEMPTIVE,
+    "delay": TaskProperty.START_DELAY,
+}
 
 
 class Client:
@@ -185,55 +193,18 @@ class Client:
 
     # tasks
 
-    async def submit(
-        self,
-        goal: Goal | Sequence[Goal],
-        *,
-        priority: int = DEFAULT_PRIORITY,
-        after: int | Task = 0,
-        delay: float = 0.0,
-        deadline: float = 0.0,
-        at: datetime | None = None,
-        vehicle: int | AnyRover | None = None,
-        nonce: int = 0,
-        label: str = "",
-        every: float | str = 0.0,
-    ) -> Task:
+    async def submit(self, goal: Goal | Sequence[Goal], **terms: Unpack[Terms]) -> Task:
         """Submit a goal, or several goals in order as one task. Return once the task is durable.
 
-        ``priority``: 0 to 10, 10 runs first. ``after``: a task that must complete first. The task
-        starts no earlier than in ``delay`` seconds, and expires if it has not started within
-        ``deadline`` seconds (0: neither). ``at``: start time, with a time zone. The client repeats
-        the submission until it is answered; the server creates one task per ``nonce`` (1 to
-        1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
-        ``label``: a name of up to 24 bytes, shown with the task.
-
-        ``vehicle``: "any" lets the server choose the rover that would begin first. It may choose
-        again until the task begins: see ``Task.vehicle``. Places must be global then.
-
-        ``every``: the task repeats, so many seconds from one start to the next (10 to 16,777,215),
-        or at the times of a cron expression in UTC, or in the time zone after it: "0 6 * * 1-5
-        Europe/Zurich". Then ``deadline`` counts from each start. With an expression there is no
-        ``delay`` and no ``at``.
+        ``terms``: priority, after, delay, deadline, at, vehicle, nonce, label, every; what they
+        mean says ``mav_tasks.client.terms.Terms``.
         """
-        check_label(label)
-        repeat = _repeat_of(every, delay, at)
-        target = self._task_server(vehicle)
-        mark = self._submissions.nonce(nonce)
-        wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
-        within = 0.0 if repeat else deadline  # else counted from each start, and set afterwards
-        terms = TaskOptions(priority, _id_of(after), wait, within)
         goals = goal if isinstance(goal, Sequence) and not isinstance(goal, str) else (goal,)
         if not goals:
             raise ValueError("no goals: nothing to do")
-        if len(goals) == 1 and isinstance(goals[0], Move | Rotate | Drive):
-            task = await self._submit_command(goals[0], terms, target, mark)
-        else:
-            items = (*wire.items_of_goals(goals), wire.options_of(terms, nonce=mark))
-            task = await self._submit_plan(items, target, mark)
-            deadline -= within  # which its options carried
-        await self._complete(task, repeat=repeat, deadline=deadline, at=at, label=label, nonce=mark)
-        return task
+        alone = goals[0] if len(goals) == 1 else None
+        command = alone if isinstance(alone, Move | Rotate | Drive) else None
+        return await self._submit(goals, command, **terms)
 
     async def task(self, task_id: int, *, vehicle: int | None = None) -> Task:
         """Return the handle of any client's task. Raise Refused (NOT_FOUND) for an unknown id."""
@@ -280,45 +251,29 @@ class Client:
         await self._control(vehicle, MavCmd.TASK_CLEAR, 1.0 if running_too else 0.0)
 
     async def modify(
-        self,
-        task_id: int,
-        *,
-        priority: int | None = None,
-        delay: float | None = None,
-        deadline: float | None = None,
-        after: int | Task | None = None,
-        before: int | Task | None = None,
-        preemptible: bool | None = None,
-        preemptive: bool | None = None,
-        at: datetime | None = None,
-        label: str | None = None,
-        every: float | str | None = None,
-        vehicle: int | None = None,
+        self, task_id: int, *, vehicle: int | None = None, **changes: Unpack[Changes]
     ) -> None:
-        """Change a task that has not ended; an argument of None changes nothing.
+        """Change a task that has not ended.
 
-        Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
-        it may interrupt other tasks. ``every`` as in ``submit``; 0: it does not repeat any more.
-        ``before``: its place in the queue is just before this task, whatever their priorities; 0:
-        behind all.
+        ``changes``: priority, delay, deadline, after, before, preemptible, preemptive, at, label,
+        every; what they mean says ``mav_tasks.client.terms.Changes``.
         """
+        if unknown := changes.keys() - Changes.__annotations__.keys():
+            raise TypeError(f"modify takes no argument {', '.join(sorted(unknown))}")
+        every, at, label = changes.get("every"), changes.get("at"), changes.get("label")
         if every is not None:
             await self._set_repeat(task_id, wire.repeat_of(every), vehicle=vehicle)
-        changes: list[tuple[TaskProperty, float]] = []
-        named: tuple[tuple[TaskProperty, float | None], ...] = (
-            (TaskProperty.PRIORITY, priority),
-            (TaskProperty.DEADLINE, deadline),
-            (TaskProperty.RUN_AFTER, None if after is None else to_param(_id_of(after))),
-            (TaskProperty.RUN_BEFORE, None if before is None else to_param(_id_of(before))),
-            (TaskProperty.PREEMPTIBLE, preemptible),
-            (TaskProperty.PREEMPTIVE, preemptive),
-            (TaskProperty.START_DELAY, delay),
-        )
-        changes += [(name, float(value)) for name, value in named if value is not None]
-        wire.check_size("deadline", deadline or 0.0)
-        wire.check_size("delay", delay or 0.0)
-        for name, value in changes:
-            await self._control(vehicle, MavCmd.TASK_MODIFY, to_param(task_id), float(name), value)
+        given: dict[str, Any] = {**changes}
+        numbers = {
+            name: to_param(id_of(value)) if name in ("after", "before") else float(value)
+            for name, value in given.items()
+            if name in PROPERTIES and value is not None
+        }
+        for name in ("deadline", "delay"):
+            wire.check_size(name, numbers.get(name, 0.0))
+        for name in filter(numbers.__contains__, PROPERTIES):
+            params = to_param(task_id), float(PROPERTIES[name]), numbers[name]
+            await self._control(vehicle, MavCmd.TASK_MODIFY, *params)
         if at is not None:
             await self._modify_exactly(
                 task_id, TaskProperty.START_UTC, round(utc_of(at)), 0, nan, vehicle=vehicle
@@ -496,41 +451,15 @@ class Client:
 
     # plans
 
-    async def submit_mission(
-        self,
-        plan: Plan,
-        *,
-        priority: int = DEFAULT_PRIORITY,
-        after: int | Task = 0,
-        delay: float = 0.0,
-        deadline: float = 0.0,
-        at: datetime | None = None,
-        vehicle: int | AnyRover | None = None,
-        nonce: int = 0,
-        check: int = 0,
-        label: str = "",
-        every: float | str = 0.0,
-    ) -> Task:
+    async def submit_mission(self, plan: Plan, *, check: int = 0, **terms: Unpack[Terms]) -> Task:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
         Raise PlanFileError if a file is invalid. ``check``, up to 2,147,483,646: if you derive the
         nonce from a longer key, more bits of that; the server refuses a mission that repeats a
-        nonce with another ``check``. Other arguments as in ``submit``.
+        nonce with another ``check``. ``terms`` as in ``submit``.
         """
-        check_label(label)
         wire.check_check(check)
-        repeat = _repeat_of(every, delay, at)
-        target = self._task_server(vehicle)
-        mark = self._submissions.nonce(nonce)
-        wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
-        within = 0.0 if repeat else deadline
-        terms = TaskOptions(priority, _id_of(after), wait, within)
-        items = (*items_of(plan), wire.options_of(terms, nonce=mark, check=check))
-        task = await self._submit_plan(items, target, mark)
-        await self._complete(
-            task, repeat=repeat, deadline=deadline - within, at=at, label=label, nonce=mark
-        )
-        return task
+        return await self._submit(plan, None, check=check, **terms)
 
     async def stage_mission(self, plan: Plan, *, vehicle: int | None = None) -> Task:
         """Stage a mission: upload it to the autopilot's address, to wait for ``start_mission``.
@@ -758,6 +687,39 @@ class Client:
 
     # submitting
 
+    async def _submit(
+        self,
+        plan: Plan,
+        command: Move | Rotate | Drive | None,
+        *,
+        priority: int = DEFAULT_PRIORITY,
+        after: int | Numbered = 0,
+        delay: float = 0.0,
+        deadline: float = 0.0,
+        at: datetime | None = None,
+        vehicle: int | AnyRover | None = None,
+        nonce: int = 0,
+        check: int = 0,
+        label: str = "",
+        every: float | str = 0.0,
+    ) -> Task:
+        """Submit a plan; ``command``: its only goal, if that is sent as a command."""
+        check_label(label)
+        repeat = _repeat_of(every, delay, at)
+        target = self._task_server(vehicle)
+        mark = self._submissions.nonce(nonce)
+        wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
+        within = 0.0 if repeat else deadline  # else counted from each start, and set afterwards
+        options = TaskOptions(priority, id_of(after), wait, within)
+        if command is not None:
+            task = await self._submit_command(command, options, target, mark)
+        else:
+            items = (*items_of(plan), wire.options_of(options, nonce=mark, check=check))
+            task = await self._submit_plan(items, target, mark)
+            deadline -= within  # which its options carried
+        await self._complete(task, repeat=repeat, deadline=deadline, at=at, label=label, nonce=mark)
+        return task
+
     async def _submit_command(
         self,
         goal: Move | Rotate | Drive,
@@ -888,7 +850,3 @@ def _repeat_of(every: float | str, delay: float, at: datetime | None) -> str:
 
 def _is_cron(repeat: str) -> bool:
     return bool(repeat) and not repeat.isdigit()
-
-
-def _id_of(task: int | Task) -> int:
-    return task.id if isinstance(task, Task) else task

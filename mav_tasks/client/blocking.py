@@ -182,10 +182,6 @@ async def called(function: Callable[[], T]) -> T:
     return function()
 
 
-def id_of(task: int | BlockingTask) -> int:
-    return task._aio.id if isinstance(task, BlockingTask) else task
-
-
 def _each(generator: AsyncIterator[T], portal: Portal) -> Iterator[T]:
     """Yield the values of an async generator as they arrive."""
 

@@ -2,9 +2,9 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from datetime import datetime
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Unpack
 
+from mav_tasks.client.terms import Changes
 from mav_tasks.client.values import TaskStatus, TaskTiming
 from mav_tasks.client.watch import Followed
 from mav_tasks.errors import ClientError, TaskFailed
@@ -107,35 +107,9 @@ class Task:
         """Cancel the task and put the rover into HOLD; no task starts until it stands still."""
         await self._client.kill(self.id, vehicle=self.vehicle)
 
-    async def modify(
-        self,
-        *,
-        priority: int | None = None,
-        delay: float | None = None,
-        deadline: float | None = None,
-        after: "int | Task | None" = None,
-        before: "int | Task | None" = None,
-        preemptible: bool | None = None,
-        preemptive: bool | None = None,
-        at: datetime | None = None,
-        label: str | None = None,
-        every: float | str | None = None,
-    ) -> None:
+    async def modify(self, **changes: Unpack[Changes]) -> None:
         """Change the task: see ``Client.modify``."""
-        await self._client.modify(
-            self.id,
-            vehicle=self.vehicle,
-            priority=priority,
-            delay=delay,
-            deadline=deadline,
-            after=after,
-            before=before,
-            preemptible=preemptible,
-            preemptive=preemptive,
-            at=at,
-            label=label,
-            every=every,
-        )
+        await self._client.modify(self.id, vehicle=self.vehicle, **changes)
 
     async def release(self, how: Release) -> None:
         """Release the task: "again" restarts it here, "remainder" finishes it, "skip" drops it."""

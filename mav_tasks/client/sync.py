@@ -4,21 +4,21 @@ Made by tools/sync_client.py: change aio.py, handle.py or blocking.py instead.
 """
 
 from collections.abc import Iterator, Sequence
-from datetime import datetime
 from pathlib import Path
+from typing import Unpack
 
-from mav_tasks.client.aio import DEFAULT_LINK, FIND_WITHIN, SCRIPT, STOP_WITHIN, AnyRover, Client
-from mav_tasks.client.blocking import BlockingClient, BlockingTask, Portal, called, id_of
+from mav_tasks.client.aio import DEFAULT_LINK, FIND_WITHIN, SCRIPT, STOP_WITHIN, Client
+from mav_tasks.client.blocking import BlockingClient, BlockingTask, Portal, called
 from mav_tasks.client.handle import Release
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.session import TELEMETRY_RATE
+from mav_tasks.client.terms import Changes, Terms
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Text, VehicleStatus
 from mav_tasks.client.wire import Goal
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import PlanFile
 from mav_tasks.services.missions import Item
-from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 
 class SyncTask(BlockingTask):
@@ -71,35 +71,9 @@ class SyncTask(BlockingTask):
         """Cancel the task and put the rover into HOLD; no task starts until it stands still."""
         self._call(self._aio.kill())
 
-    def modify(
-        self,
-        *,
-        priority: int | None = None,
-        delay: float | None = None,
-        deadline: float | None = None,
-        after: "int | SyncTask | None" = None,
-        before: "int | SyncTask | None" = None,
-        preemptible: bool | None = None,
-        preemptive: bool | None = None,
-        at: datetime | None = None,
-        label: str | None = None,
-        every: float | str | None = None,
-    ) -> None:
+    def modify(self, **changes: Unpack[Changes]) -> None:
         """Change the task: see ``SyncClient.modify``."""
-        self._call(
-            self._aio.modify(
-                priority=priority,
-                delay=delay,
-                deadline=deadline,
-                after=None if after is None else id_of(after),
-                before=None if before is None else id_of(before),
-                preemptible=preemptible,
-                preemptive=preemptive,
-                at=at,
-                label=label,
-                every=every,
-            )
-        )
+        self._call(self._aio.modify(**changes))
 
     def release(self, how: Release) -> None:
         """Release the task: "again" restarts it here, "remainder" finishes it, "skip" drops it."""
@@ -166,52 +140,13 @@ class SyncClient(BlockingClient):
         """Close the link. The server continues the tasks."""
         self._end()
 
-    def submit(
-        self,
-        goal: Goal | Sequence[Goal],
-        *,
-        priority: int = DEFAULT_PRIORITY,
-        after: int | SyncTask = 0,
-        delay: float = 0.0,
-        deadline: float = 0.0,
-        at: datetime | None = None,
-        vehicle: int | AnyRover | None = None,
-        nonce: int = 0,
-        label: str = "",
-        every: float | str = 0.0,
-    ) -> SyncTask:
+    def submit(self, goal: Goal | Sequence[Goal], **terms: Unpack[Terms]) -> SyncTask:
         """Submit a goal, or several goals in order as one task. Return once the task is durable.
 
-        ``priority``: 0 to 10, 10 runs first. ``after``: a task that must complete first. The task
-        starts no earlier than in ``delay`` seconds, and expires if it has not started within
-        ``deadline`` seconds (0: neither). ``at``: start time, with a time zone. The client repeats
-        the submission until it is answered; the server creates one task per ``nonce`` (1 to
-        1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
-        ``label``: a name of up to 24 bytes, shown with the task.
-
-        ``vehicle``: "any" lets the server choose the rover that would begin first. It may choose
-        again until the task begins: see ``Task.vehicle``. Places must be global then.
-
-        ``every``: the task repeats, so many seconds from one start to the next (10 to 16,777,215),
-        or at the times of a cron expression in UTC, or in the time zone after it: "0 6 * * 1-5
-        Europe/Zurich". Then ``deadline`` counts from each start. With an expression there is no
-        ``delay`` and no ``at``.
+        ``terms``: priority, after, delay, deadline, at, vehicle, nonce, label, every; what they
+        mean says ``mav_tasks.client.terms.Terms``.
         """
-        return self._handle(
-            SyncTask,
-            self._aio.submit(
-                goal,
-                priority=priority,
-                after=id_of(after),
-                delay=delay,
-                deadline=deadline,
-                at=at,
-                vehicle=vehicle,
-                nonce=nonce,
-                label=label,
-                every=every,
-            ),
-        )
+        return self._handle(SyncTask, self._aio.submit(goal, **terms))
 
     def task(self, task_id: int, *, vehicle: int | None = None) -> SyncTask:
         """Return the handle of any client's task. Raise Refused (NOT_FOUND) for an unknown id."""
@@ -254,44 +189,14 @@ class SyncClient(BlockingClient):
         self._call(self._aio.clear(running_too=running_too, vehicle=vehicle))
 
     def modify(
-        self,
-        task_id: int,
-        *,
-        priority: int | None = None,
-        delay: float | None = None,
-        deadline: float | None = None,
-        after: int | SyncTask | None = None,
-        before: int | SyncTask | None = None,
-        preemptible: bool | None = None,
-        preemptive: bool | None = None,
-        at: datetime | None = None,
-        label: str | None = None,
-        every: float | str | None = None,
-        vehicle: int | None = None,
+        self, task_id: int, *, vehicle: int | None = None, **changes: Unpack[Changes]
     ) -> None:
-        """Change a task that has not ended; an argument of None changes nothing.
+        """Change a task that has not ended.
 
-        Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
-        it may interrupt other tasks. ``every`` as in ``submit``; 0: it does not repeat any more.
-        ``before``: its place in the queue is just before this task, whatever their priorities; 0:
-        behind all.
+        ``changes``: priority, delay, deadline, after, before, preemptible, preemptive, at, label,
+        every; what they mean says ``mav_tasks.client.terms.Changes``.
         """
-        self._call(
-            self._aio.modify(
-                task_id,
-                priority=priority,
-                delay=delay,
-                deadline=deadline,
-                after=None if after is None else id_of(after),
-                before=None if before is None else id_of(before),
-                preemptible=preemptible,
-                preemptive=preemptive,
-                at=at,
-                label=label,
-                every=every,
-                vehicle=vehicle,
-            )
-        )
+        self._call(self._aio.modify(task_id, vehicle=vehicle, **changes))
 
     def release(
         self,
@@ -360,43 +265,14 @@ class SyncClient(BlockingClient):
         """Yield each STATUSTEXT of rovers and task servers from now on."""
         return self._each(self._aio.texts())
 
-    def submit_mission(
-        self,
-        plan: Plan,
-        *,
-        priority: int = DEFAULT_PRIORITY,
-        after: int | SyncTask = 0,
-        delay: float = 0.0,
-        deadline: float = 0.0,
-        at: datetime | None = None,
-        vehicle: int | AnyRover | None = None,
-        nonce: int = 0,
-        check: int = 0,
-        label: str = "",
-        every: float | str = 0.0,
-    ) -> SyncTask:
+    def submit_mission(self, plan: Plan, *, check: int = 0, **terms: Unpack[Terms]) -> SyncTask:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
         Raise PlanFileError if a file is invalid. ``check``, up to 2,147,483,646: if you derive the
         nonce from a longer key, more bits of that; the server refuses a mission that repeats a
-        nonce with another ``check``. Other arguments as in ``submit``.
+        nonce with another ``check``. ``terms`` as in ``submit``.
         """
-        return self._handle(
-            SyncTask,
-            self._aio.submit_mission(
-                plan,
-                priority=priority,
-                after=id_of(after),
-                delay=delay,
-                deadline=deadline,
-                at=at,
-                vehicle=vehicle,
-                nonce=nonce,
-                check=check,
-                label=label,
-                every=every,
-            ),
-        )
+        return self._handle(SyncTask, self._aio.submit_mission(plan, check=check, **terms))
 
     def stage_mission(self, plan: Plan, *, vehicle: int | None = None) -> SyncTask:
         """Stage a mission: upload it to the autopilot's address, to wait for ``start_mission``.

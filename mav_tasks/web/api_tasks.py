@@ -4,7 +4,7 @@ from typing import Any
 
 from starlette.responses import Response
 
-from mav_tasks.client.aio import AnyRover, Client
+from mav_tasks.client.aio import Client
 from mav_tasks.client.goal_form import goals_of
 from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.parts import (
@@ -21,6 +21,7 @@ from mav_tasks.client.parts import (
     TASK_OR_NONE,
 )
 from mav_tasks.client.plan_sources import Plan
+from mav_tasks.client.terms import AnyRover
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import NoSuchVehicle
 from mav_tasks.setting_keys.parts import Part
