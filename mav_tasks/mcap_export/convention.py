@@ -1,4 +1,4 @@
-"""The names in an MCAP file, for writing and reading it.
+"""The names in an MCAP file.
 
 dialects/README.md, "Recordings as MCAP", describes them. A change that a reader of older files
 would notice needs a new VERSION.
@@ -10,8 +10,6 @@ VERSION = "1"
 
 #: name of the metadata record that says which convention the file follows
 CONVENTION = "mav-tasks"
-#: name of the metadata records at the end, one for each telemetry log
-TLOG = "mav-tasks tlog"
 
 RAW = "/mavlink/raw"
 RAW_ENCODING = "tlog"

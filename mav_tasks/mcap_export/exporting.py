@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mav_tasks.mavlink.codec import Decoder
-from mav_tasks.mcap_export.log_facts import LogFacts
 from mav_tasks.mcap_export.task_views import TaskViews
 from mav_tasks.mcap_export.views import Views
 from mav_tasks.mcap_export.writing import McapWriter
@@ -31,7 +30,6 @@ class _Export:
         self._decoder = Decoder()
         self._views = Views()
         self._tasks = TaskViews()
-        self._logs: dict[str, LogFacts] = {}
         self._time = 0
 
     def add(self, item: Heard | Happened | Restored) -> None:
@@ -50,17 +48,10 @@ class _Export:
     def finish(self) -> Counts:
         for seen in self._views.rest(time=self._time):
             self._writer.add(seen)
-        for log in self._logs.values():
-            self._writer.add_log(log)
         self._writer.finish()
         return self.counts
 
     def _hear(self, heard: Heard) -> None:
-        name = heard.way.file
-        log = self._logs.get(name)
-        if log is None:
-            log = self._logs[name] = LogFacts(name)
-        log.add(heard.data)
         self._writer.add_raw(heard)
         packet = heard.packet
         if packet is None:

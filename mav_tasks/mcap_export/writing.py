@@ -17,11 +17,9 @@ from mav_tasks.mcap_export.convention import (
     RAW,
     RAW_ENCODING,
     RAW_SCHEMA,
-    TLOG,
     VERSION,
     message_topic,
 )
-from mav_tasks.mcap_export.log_facts import LogFacts
 from mav_tasks.mcap_export.message_json import MessageJson
 from mav_tasks.mcap_export.schemas import Schema, message_schema
 from mav_tasks.mcap_export.views import Seen
@@ -86,10 +84,6 @@ class McapWriter:
             self._channels[seen.topic] = channel
         data = _encode(seen.values).encode()
         self._writer.add_message(channel, seen.time, data, seen.time)
-
-    def add_log(self, log: LogFacts) -> None:
-        """Add the facts that check a telemetry log restored from this file."""
-        self._writer.add_metadata(TLOG, log.metadata())
 
     def finish(self) -> None:
         """Write the index."""

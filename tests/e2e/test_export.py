@@ -1,4 +1,4 @@
-"""Recordings of real runs as MCAP, and telemetry logs back; real processes, stock pymavlink."""
+"""Recordings of real runs as MCAP; real processes, stock pymavlink."""
 
 import json
 import os
@@ -75,15 +75,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 @pytest.mark.slow
-def test_the_log_of_a_run_comes_back(run: Run, tmp_path: Path) -> None:
-    back = tmp_path / "back.tlog"
-    done = called("export", "--tlog", str(back), str(run.mcap), "--json")
-    assert done.objects == [{"done": "export", "file": str(back), "bytes": run.log.stat().st_size}]
-    assert back.read_bytes() == run.log.read_bytes()
-    assert stat.S_IMODE(back.stat().st_mode) == stat.S_IMODE(run.mcap.stat().st_mode) == 0o600
-
-
-@pytest.mark.slow
 def test_another_reader_finds_each_message_and_no_fault(run: Run) -> None:
     expected = Counter(
         f"/mavlink/{each.get_srcSystem()}/{each.get_srcComponent()}/{each.get_type()}"
@@ -98,15 +89,22 @@ def test_another_reader_finds_each_message_and_no_fault(run: Run) -> None:
                 check(json.loads(message.data), json.loads(schema.data), channel.topic)
     assert {t: n for t, n in found.items() if t in expected} == expected
     assert found["/mavlink/raw"] == expected.total()
+    assert stat.S_IMODE(run.mcap.stat().st_mode) == 0o600
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", ["--mcap", "--tlog"])
-def test_a_full_disk_leaves_nothing_behind(run: Run, tmp_path: Path, way: str) -> None:
-    source = run.log if way == "--mcap" else run.mcap
+def test_a_full_disk_leaves_nothing_behind(run: Run, tmp_path: Path) -> None:
     limit = (8_192, 8_192)
     done = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "export", way, str(tmp_path / "out"), str(source)],
+        [
+            sys.executable,
+            "-m",
+            "mav_tasks.cli",
+            "export",
+            "--mcap",
+            str(tmp_path / "out"),
+            str(run.log),
+        ],
         capture_output=True,
         text=True,
         timeout=30,

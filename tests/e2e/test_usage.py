@@ -78,7 +78,6 @@ def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
 #: a package that is missing, a command, and how it ends
 MISSING = """mcp mcp => mcp needs the package mcp: run pip install '.[mcp]'
 mcap export x --mcap y => export needs the package mcap: run pip install '.[mcap]'
-mcap export x --tlog y => export needs the package mcap
 uvicorn web => the web page needs the package uvicorn: run pip install '.[web]'
 xstatic.pkg.leaflet web --listen 127.0.0.1:0 => the web page needs the package XStatic-Leaflet"""
 WITHOUT = """import sys

@@ -64,14 +64,10 @@ queue --sign anna --keys FILE: --sign: no key
 mission upload no/such/file: No such file
 mission upload FILE --stage --label x: only --wait goes with it
 mission upload FILE --stage --vehicle any: name it with --vehicle N
-export x: choose one of --mcap
-export x --mcap a --tlog b: choose one of --mcap
-export a b --tlog c: one MCAP file, not 2
 export x --mcap FOLDER: not a file
 export FILE --mcap FILE: is also read
 export x --mcap FILE: use --force to overwrite
 export x --mcap FOLDER/no/out: No such file
-export FILE --tlog FOLDER/out: FILE
 probe: the URL of the rover is missing
 probe tcp:127.0.0.1:9 --drive --set-failsafe: use one, then the other
 probe tcp:127.0.0.1:9 --drive: without a terminal, add --yes
