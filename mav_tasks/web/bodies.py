@@ -8,16 +8,16 @@ that declares the parts, and the body behind it; it answers in JSON.
 import asyncio
 import json
 import os
-import pickle
 import subprocess
 import sys
-from base64 import b64decode, b64encode
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from mav_tasks.errors import MavTasksError
 from mav_tasks.plan_files.values import FenceCircle, FencePolygon, GeoPoint, PlanFile, PlanItem
 from mav_tasks.setting_keys.parts import Part, read_all, shortened
+from mav_tasks.setting_keys.shapes import Choice, Flag, Items, Number, Record, Text
 from mav_tasks.web.guard import SMALL_BODY
 from mav_tasks.web.plan_text import READINGS, Parts
 from mav_tasks.web.problems import Problem, invalid, problem_of
@@ -26,6 +26,10 @@ MOST_PARTS = 300_000  # lists and objects of a body: a plan file of 6,000 items 
 WITHIN = 20.0  # s
 NICE = 10  # it has time: the event loop comes first
 COMMAND = (sys.executable, "-m", "mav_tasks.web.bodies")
+
+SHAPES: dict[str, Any] = {
+    kind.__name__: kind for kind in (Choice, Flag, Items, Number, Record, Text)
+}
 
 _one_at_a_time = asyncio.Lock()
 
@@ -65,11 +69,15 @@ def _object_of(parts: list[tuple[str, Any]]) -> Parts:
 
 
 def _read_apart(data: bytes, parts: Sequence[Part], reading: str) -> Parts:
-    head = b64encode(pickle.dumps((parts, reading)))  # to ourselves, so that it can be trusted
+    declared = [
+        (part.name, type(part.shape).__name__, asdict(part.shape), part.meaning, part.is_required)
+        for part in parts
+    ]
+    head = json.dumps({"parts": declared, "reading": reading})
     try:
         ended = subprocess.run(
             COMMAND,
-            input=head + b"\n" + data,
+            input=head.encode() + b"\n" + data,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             timeout=WITHIN,
@@ -88,11 +96,14 @@ def _read_apart(data: bytes, parts: Sequence[Part], reading: str) -> Parts:
 def main() -> None:
     """Read the body on standard input; write its parts, or the parts of its Problem."""
     os.nice(NICE)
-    head = sys.stdin.buffer.readline()
+    head = json.loads(sys.stdin.buffer.readline())
     answer: dict[str, Any] = {"problem": None, "parts": None, "plan": None}
     try:
-        parts, reading = pickle.loads(b64decode(head))
-        found = _read(sys.stdin.buffer.read(), parts, reading)
+        parts = [
+            Part(name, SHAPES[kind](**shape), meaning, is_required)
+            for name, kind, shape, meaning, is_required in head["parts"]
+        ]
+        found = _read(sys.stdin.buffer.read(), parts, head["reading"])
         plan = found.pop("plan", None)
         answer |= {"parts": found, "plan": None if plan is None else _values_of(plan)}
     except (MavTasksError, ValueError) as error:
