@@ -79,7 +79,7 @@ class Calls:
             form = await tool.run(self._rovers, values, report)
             if tool.makes_a_task and self._durable is not None and has_tasks(context):
                 return self._durable.created(await self._rovers.status(form["id"]))
-        except (UsageError, ClientError) as error:
+        except (UsageError, ClientError, ValueError) as error:
             return refusal(str(error))
         return result(form)
 

@@ -69,8 +69,6 @@ async def submit(rovers: Rovers, wish: Wish) -> TaskStatus:
             **wish.terms,
         )
         return await task.refresh()
-    except ValueError as error:
-        raise UsageError(str(error)) from error
     except NoAnswer as error:
         words = "The task may exist: submit the same again with the same idempotency_key"
         raise NoAnswer(f"{error}. {words}", nonce=numbers.nonce) from error

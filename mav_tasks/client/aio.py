@@ -593,13 +593,16 @@ class Client:
     async def _seen(self, vehicle: int | None, epoch: int | None) -> float:
         """Return the command parameter for an epoch; None: the present one.
 
-        Raise ClientError if this client requests a STOP or a pause meanwhile.
+        The server takes 0 for "no epoch", and does not compare it. Raise ClientError if this
+        client requests a STOP or a pause meanwhile.
         """
         if epoch is None:
             halts = self._halts
             epoch = (await self._ask.overview(self._which(vehicle))).halt_epoch
             if halts != self._halts:
                 raise ClientError(OVERTAKEN)
+        elif epoch and epoch % EPOCHS == 0:
+            raise ValueError(f"epoch {epoch} would be sent as none: read the queue again")
         return float(epoch % EPOCHS)
 
     async def _cancel(

@@ -11,7 +11,6 @@ from mav_tasks.errors import MavTasksError, NoSuchVehicle, Refused
 from mav_tasks.plan_files import PlanFile
 from mav_tasks.setting_keys.parts import Part, schema_of
 from mav_tasks.setting_keys.shapes import LARGEST, Flag, Items, Number, Record
-from mav_tasks.web.epochs import seen_epoch
 from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation
@@ -83,7 +82,7 @@ def operations(services: Services) -> list[Operation]:
         return await send(last)
 
     async def resume(call: Call, client: Client) -> None:
-        await client.resume(epoch=seen_epoch(call.body), vehicle=known(call))
+        await client.resume(epoch=call.body["epoch"], vehicle=known(call))
         await live.refresh(call.vehicle)
 
     async def clear(call: Call, client: Client) -> None:

@@ -27,7 +27,6 @@ from mav_tasks.errors import NoSuchVehicle
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Flag, Number
 from mav_tasks.tasks.repetition import MAX_PERIOD
-from mav_tasks.web.epochs import seen_epoch
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.plan_text import NAME, text_part
@@ -131,7 +130,7 @@ def operations(services: Services) -> list[Operation]:
         live.hurry(status.vehicle)
 
     async def release(call: Call, by: Client) -> None:
-        epoch, how = seen_epoch(call.body), call.body["how"]
+        epoch, how = call.body["epoch"], call.body["how"]
         status = await status_of(call)
         await by.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
         live.hurry(status.vehicle)

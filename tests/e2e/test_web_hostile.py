@@ -85,10 +85,9 @@ def test_an_id_out_of_range_is_not_found_and_never_asked_for(page: Web) -> None:
 @pytest.mark.parametrize("epoch", [0, 1 << 24, 1 << 25, -1, 1 << 32, 1.5, True])
 def test_an_epoch_that_names_no_halt_does_not_release_a_stop(page: Web, epoch: object) -> None:
     page.post("/stop", {})
-    for path, more in (("/vehicles/1/resume", {}), ("/tasks/1/release", {"how": "again"})):
-        refused = page.send("POST", path, {"epoch": epoch} | more)
-        assert refused.status_code == 422
-        assert refused.json()["detail"].startswith("epoch")
+    refused = page.send("POST", "/vehicles/1/resume", {"epoch": epoch})
+    assert refused.status_code == 422
+    assert refused.json()["detail"].startswith("epoch")
     assert page.get("/vehicles/1/queue")["paused"] == "stopped"
 
 
