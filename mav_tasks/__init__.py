@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from mav_tasks.errors import Refused as Refused
     from mav_tasks.errors import TaskFailed as TaskFailed
     from mav_tasks.errors import UsageError as UsageError
+    from mav_tasks.kinds import Drive as Drive
+    from mav_tasks.kinds import Face as Face
+    from mav_tasks.kinds import GlobalPlace as GlobalPlace
+    from mav_tasks.kinds import GoTo as GoTo
+    from mav_tasks.kinds import LocalPlace as LocalPlace
+    from mav_tasks.kinds import Move as Move
+    from mav_tasks.kinds import Rotate as Rotate
+    from mav_tasks.kinds import Wait as Wait
     from mav_tasks.mavlink.signing import Key as Key
     from mav_tasks.plan_files import read_plan as read_plan
     from mav_tasks.plan_files import write_plan as write_plan
-    from mav_tasks.tasks.goal import Drive as Drive
-    from mav_tasks.tasks.goal import Face as Face
-    from mav_tasks.tasks.goal import GlobalPlace as GlobalPlace
-    from mav_tasks.tasks.goal import GoTo as GoTo
-    from mav_tasks.tasks.goal import LocalPlace as LocalPlace
-    from mav_tasks.tasks.goal import Move as Move
-    from mav_tasks.tasks.goal import Rotate as Rotate
-    from mav_tasks.tasks.goal import Wait as Wait
     from mav_tasks.tasks.lifecycle import TaskReason as TaskReason
     from mav_tasks.tasks.lifecycle import TaskState as TaskState
 
@@ -50,7 +50,7 @@ _HOMES = {
     ),
     "mav_tasks.mavlink.signing": "Key",
     "mav_tasks.plan_files": "read_plan write_plan",
-    "mav_tasks.tasks.goal": "Drive Face GlobalPlace GoTo LocalPlace Move Rotate Wait",
+    "mav_tasks.kinds": "Drive Face GlobalPlace GoTo LocalPlace Move Rotate Wait",
     "mav_tasks.tasks.lifecycle": "TaskReason TaskState",
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}

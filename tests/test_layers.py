@@ -23,18 +23,19 @@ link_reader: engine links
 setting_keys: errors
 settings: errors setting_keys
 mavlink: errors
+kinds: errors setting_keys
 whole_file:
 folders: errors
 plan_files: errors mavlink whole_file
 services: errors latest mavlink setting_keys settings
-tasks: errors histogram latest settings
-engine: errors histogram latest mavlink services settings tasks
+tasks: errors histogram kinds latest settings
+engine: errors histogram kinds latest mavlink services settings tasks
 links: clock crowd errors
 store: clock errors folders mailbox settings tasks whole_file
 observer: engine tasks
 recording: engine errors folders logs mavlink observer settings store tasks
 metrics: clock engine errors histogram links mavlink observer settings tasks
-logs: clock engine errors mavlink services settings store tasks
+logs: clock engine errors kinds mavlink services settings store tasks
 mcap_export: engine errors logs mavlink recording services tasks
 pump: engine logs observer store tasks
 link_keys: errors key_ring links settings
@@ -46,22 +47,23 @@ fleet_link: clock engine fleet_io links
 gateway: clock engine errors fleet fleet_io fleet_link settings store
 serve: clock config engine errors gateway key_ring link_keys links logs metrics observer
     recording runner settings store tasks
-client: errors latest links mavlink plan_files services setting_keys tasks
+client: errors kinds latest links mavlink plan_files services setting_keys tasks
 crowd:
 http_connections: crowd logs settings
-agents: client errors http_connections mavlink setting_keys tasks
+agents: client errors http_connections kinds mavlink setting_keys tasks
 qgc_actions: errors mavlink whole_file
-web: client crowd engine errors folders histogram http_connections key_ring latest logs mavlink
+web: client crowd engine errors folders histogram http_connections key_ring kinds latest logs
+    mavlink
     metrics plan_files recording services setting_keys settings store tasks
 probe: engine errors mavlink services settings tasks
 probing: client errors links mavlink probe
-cli: agents client config errors folders key_ring link_keys links logs mavlink mcap_export
+cli: agents client config errors folders key_ring kinds link_keys links logs mavlink mcap_export
     plan_files probe probing qgc_actions recording serve setting_keys settings store tasks web
     whole_file
 rover_sim: errors key_ring links mavlink
-rover_sim.testing: client in_memory links mavlink rover_sim settings store tasks
-rover_sim.field_trial: client errors links tasks
-rover_sim.demo: client errors in_memory links recording rover_sim settings tasks
+rover_sim.testing: client in_memory kinds links mavlink rover_sim settings store tasks
+rover_sim.field_trial: client errors kinds links tasks
+rover_sim.demo: client errors in_memory kinds links recording rover_sim settings tasks
 """
 
 
@@ -81,6 +83,7 @@ PURE = (
     "mav_tasks.histogram",
     "mav_tasks.settings",
     "mav_tasks.setting_keys",
+    "mav_tasks.kinds",
     "mav_tasks.mavlink",
     "mav_tasks.services",
     "mav_tasks.tasks",
@@ -265,6 +268,7 @@ SEAMS = (
     # its events and words, and the parameters that it publishes
     *("mav_tasks.tasks.events", "mav_tasks.tasks.lifecycle"),
     *("mav_tasks.tasks.task", "mav_tasks.tasks.goal", "mav_tasks.tasks.restored"),
+    "mav_tasks.kinds",
     *("mav_tasks.tasks.view", "mav_tasks.tasks.timing", "mav_tasks.services.parameter_table"),
     # contracts that have several implementations
     *("mav_tasks.store", "mav_tasks.links", "mav_tasks.fleet_io", "mav_tasks.observer"),

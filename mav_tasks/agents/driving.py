@@ -7,7 +7,6 @@ from mav_tasks.agents.forms import DONE, TASK, task_form
 from mav_tasks.agents.reading import ID, ROVER
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
-from mav_tasks.client.goal_form import goal_schema
 from mav_tasks.client.parts import (
     AFTER,
     DEADLINE,
@@ -19,6 +18,7 @@ from mav_tasks.client.parts import (
     LABEL,
     PRIORITY,
 )
+from mav_tasks.kinds.in_json import goal_schema
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Items, Number
 

@@ -3,7 +3,7 @@
 from math import hypot
 
 from mav_tasks.errors import UsageError
-from mav_tasks.tasks.goal import GlobalPlace, LocalPlace, Place
+from mav_tasks.kinds import GlobalPlace, LocalPlace, Place
 
 #: m; numbers of a place farther from the origin may be degrees
 NEAR = 20.0

@@ -19,7 +19,7 @@ from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json
 from mav_tasks.client.wire import Goal
 from mav_tasks.errors import ClientError
-from mav_tasks.tasks.goal import Drive, Face, GoTo, Move, Rotate, Wait
+from mav_tasks.kinds import Drive, Face, GoTo, Move, Rotate, Wait
 
 EPILOG = """\b
 Examples:

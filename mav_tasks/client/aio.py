@@ -32,6 +32,7 @@ from mav_tasks.client.values import (
 from mav_tasks.client.watch import Followed
 from mav_tasks.client.wire import SERVER, Goal, TaskOptions
 from mav_tasks.errors import ClientError, LinkDown, MavTasksError, NoAnswer, Refused
+from mav_tasks.kinds import Drive, Move, Rotate
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -50,7 +51,6 @@ from mav_tasks.plan_files import (
     rally_items,
 )
 from mav_tasks.services.missions import Item
-from mav_tasks.tasks.goal import Drive, Move, Rotate
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 

@@ -3,16 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mav_tasks.kinds.goto import ON_EARTH
 from mav_tasks.plan_files import FenceCircle, FencePolygon, PlanFile
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Number
 
 DEGREE = 1e7  # of MAVLink's integers
-PLACE = (
-    Part("latitude", Number(-90.0, 90.0, "deg"), "latitude, WGS 84", True),
-    Part("longitude", Number(-180.0, 180.0, "deg"), "longitude, WGS 84", True),
-)
-CIRCLE = (*PLACE, Part("radius", Number(0.1, 100_000.0, "m"), "radius", True))
+CIRCLE = (*ON_EARTH, Part("radius", Number(0.1, 100_000.0, "m"), "radius", True))
 
 
 def shapes_of(plan: PlanFile) -> list[dict[str, Any]]:
@@ -29,7 +26,7 @@ def circle_of(value: Mapping[str, Any]) -> PlanFile:
 
 def polygon_of(value: Sequence[Any]) -> PlanFile:
     """Return a fence that keeps a rover inside a polygon. Raise SettingError if it is invalid."""
-    places = (_read(PLACE, place, f"polygon[{at}].") for at, place in enumerate(value))
+    places = (_read(ON_EARTH, place, f"polygon[{at}].") for at, place in enumerate(value))
     polygon = FencePolygon(True, tuple(_degE7(**place) for place in places))
     return PlanFile((), None, (polygon,), ())
 

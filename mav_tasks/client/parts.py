@@ -1,7 +1,7 @@
 """The parts of requests in JSON, for the HTTP API and agents: each declared once. Pure."""
 
-from mav_tasks.client.goal_form import goal_schema
 from mav_tasks.client.idempotency import LONGEST
+from mav_tasks.kinds.in_json import goal_schema
 from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Choice, Items, Number, Text

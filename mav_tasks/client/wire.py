@@ -9,23 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import degrees, isfinite
 
+from mav_tasks.kinds import Drive, Face, GlobalPlace, GoTo, LocalPlace, Move, Place, Rotate, Wait
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.plan_files.values import PlanItem
 from mav_tasks.services.missions import Item
-from mav_tasks.tasks.goal import (
-    Drive,
-    Face,
-    GlobalPlace,
-    GoTo,
-    LocalPlace,
-    Move,
-    Place,
-    Rotate,
-    Wait,
-)
 from mav_tasks.tasks.repetition import canonical
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_TASK_ID
 

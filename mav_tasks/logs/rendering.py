@@ -15,6 +15,7 @@ from math import isfinite
 from types import NoneType
 from typing import Any, cast
 
+from mav_tasks.kinds import Place
 from mav_tasks.store.codec import MONOTONIC
 from mav_tasks.tasks.events import (
     Event,
@@ -28,7 +29,7 @@ from mav_tasks.tasks.events import (
     VehicleHalted,
     VehicleNoted,
 )
-from mav_tasks.tasks.goal import Goal, Place
+from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Submitter, Task
 

@@ -10,9 +10,9 @@ from math import hypot
 from operator import attrgetter
 
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import GlobalPlace, GoTo
 from mav_tasks.latest import keep_latest, shorten
 from mav_tasks.tasks.driving.frames import local_place
-from mav_tasks.tasks.goal import GlobalPlace, GoTo
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import ANY, Draft, Submitter, Task, TaskId

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mav_tasks.tasks.cron import utc_text
-from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Frame, Progress, Task, TaskId, Terms
 from mav_tasks.tasks.timing import Timing
@@ -48,7 +47,7 @@ class TaskSubmitted:
         label = f" '{task.terms.label}'" if task.terms.label else ""
         run = f", a run of series {task.terms.series}" if task.is_made else ""
         return (
-            f"rover {task.vehicle}: task {task.id} submitted: {describe(task.goal)}{label}, "
+            f"rover {task.vehicle}: task {task.id} submitted: {task.goal.words}{label}, "
             f"priority {task.priority}, by {task.submitter}{run}"
         )
 

@@ -1,133 +1,10 @@
-"""The goals of tasks, as frozen values. SI units and radians; angles clockwise from north."""
+"""The goals of tasks, as frozen values: one of a kind, or a plan of steps."""
 
 from dataclasses import dataclass
-from math import degrees
 
+from mav_tasks.kinds import GoTo, SingleGoal
 
-@dataclass(frozen=True, slots=True)
-class Move:
-    """Drive straight along the heading at the start.
-
-    ``distance`` in metres, negative = backwards; ``speed`` in m/s, positive, None = default.
-    """
-
-    distance: float
-    speed: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class MoveTurned:
-    """Move backwards with a vehicle that cannot reverse: turn round, drive, turn back.
-
-    ``distance`` in metres, positive; ``speed`` as in Move.
-    """
-
-    distance: float
-    speed: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Rotate:
-    """Turn on the spot: ``angle`` in radians, clockwise positive, may exceed a full turn.
-
-    ``rate`` in rad/s, positive, None = default.
-    """
-
-    angle: float
-    rate: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Drive:
-    """Keep a velocity for a time: m/s forward, rad/s clockwise, ``duration`` in seconds."""
-
-    forward: float
-    yaw_rate: float
-    duration: float
-
-
-@dataclass(frozen=True, slots=True)
-class LocalPlace:
-    """A place in the vehicle's own local frame, metres north and east of its origin."""
-
-    north: float
-    east: float
-
-
-@dataclass(frozen=True, slots=True)
-class GlobalPlace:
-    """A place on earth, exactly as MAVLink's integers give it."""
-
-    latitude_degE7: int
-    longitude_degE7: int
-
-
-Place = LocalPlace | GlobalPlace
-
-
-@dataclass(frozen=True, slots=True)
-class GoTo:
-    """Drive to a place in a straight line, facing forward.
-
-    ``place`` None is the vehicle's home. ``speed`` in m/s, None = default. ``radius`` is the
-    acceptance radius in metres, None = the tolerance of a move. ``yaw`` is the heading in radians
-    to turn to on arrival, None = any. ``wait`` is the seconds to stand there. ``passes``: in a
-    plan, the vehicle does not stop at the place if another one follows. With ``turns`` it drives
-    that many turns round the place instead, ``around`` metres from it, negative =
-    counter-clockwise. ``backwards``: it drives there backwards.
-    """
-
-    place: Place | None
-    speed: float | None = None
-    radius: float | None = None
-    yaw: float | None = None
-    wait: float = 0.0
-    passes: bool = False
-    turns: float = 0.0
-    around: float = 0.0
-    backwards: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Face:
-    """Turn on the spot to a heading.
-
-    ``yaw`` in radians from north; ``direction`` 1 clockwise, -1 counter-clockwise, 0 the shorter
-    way; ``rate`` in rad/s, None = default.
-    """
-
-    yaw: float
-    direction: int = 0
-    rate: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Head:
-    """Drive towards a heading for a time: ``yaw`` in radians, ``forward`` in m/s.
-
-    ``is_relative``: the yaw counts from the heading at the start.
-    """
-
-    yaw: float
-    forward: float
-    duration: float
-    is_relative: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Wait:
-    """Stand for ``duration`` seconds.
-
-    With ``until`` it stands until that time of day (UTC), and ``duration`` is when it comes again:
-    hour, minute and second, of which the first ones may be -1 = any.
-    """
-
-    duration: float
-    until: tuple[int, ...] = ()
-
-
-#: a goal that drives on its own: a task's goal, or a step of a plan
-SingleGoal = Move | MoveTurned | Rotate | Drive | GoTo | Face | Head | Wait
+FEW_STEPS = 4  # most steps of a plan that may be told as a single goal
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +17,10 @@ class SetSpeed:
     """Drive at ``speed`` m/s from here on; None: as without a plan."""
 
     speed: float | None
+
+    @property
+    def named_speed(self) -> float:
+        return self.speed or 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,6 +88,17 @@ class Plan:
         """Number of items in the plan's file, without home and options."""
         return len(self.steps) - self.has_home - self.has_options
 
+    @property
+    def words(self) -> str:
+        """What it does: its only goal, if the other steps are its speed and options."""
+        if len(self.steps) <= FEW_STEPS and not self.has_home:  # with home it is a mission
+            unseen = Nothing | SetSpeed | SetReverse
+            driven = [step for step in self.steps if not isinstance(step, unseen)]
+            if len(driven) == 1 and isinstance(driven[0], SingleGoal):
+                return driven[0].words
+        count = self.item_count
+        return f"plan of {count} item{'s' if count != 1 else ''}"
+
     def item_number(self, step: int) -> int:
         """Return the number of a step's item in its file, from 1; 0 is home."""
         return number_of(step, has_home=self.has_home)
@@ -222,63 +114,6 @@ def number_of(step: int, *, has_home: bool) -> int:
 
 Goal = SingleGoal | Plan
 
-FEW_STEPS = 4  # most steps of a plan that may be described as a single goal
-
-
-def describe(goal: Goal) -> str:
-    """Return a goal as text, in the units of its command."""
-    if isinstance(goal, GoTo):
-        return _describe_way(goal.place)
-    if isinstance(goal, Plan):
-        return _describe_plan(goal)
-    match goal:
-        case Move(distance=distance):
-            return f"move {distance:g} m"
-        case MoveTurned(distance=distance):
-            return f"move {-distance:g} m"
-        case Rotate(angle=angle):
-            return f"rotate {degrees(angle):.6g} deg"
-        case Drive(forward=forward, duration=duration):
-            return f"drive {forward:g} m/s for {duration:g} s"
-        case Face(yaw=yaw):
-            return f"face {degrees(yaw) % 360:.6g} deg"
-        case Head(forward=forward, duration=duration):
-            return f"drive {forward:g} m/s on a heading for {duration:g} s"
-        case Wait(until=until) if until:
-            return f"wait until {':'.join(f'{part:02}' for part in until)} UTC"
-        case Wait(duration=duration):
-            return f"wait {duration:g} s"
-
-
-def kind_of(goal: SingleGoal) -> str:
-    """Return a goal's kind as the rules of roles name it: one of ``TASK_KINDS`` in the settings."""
-    match goal:
-        case Move() | MoveTurned():
-            return "move"
-        case Rotate() | Face():
-            return "rotate"
-        case Drive() | Head():
-            return "drive"
-        case GoTo(place=None):
-            return "return"
-        case GoTo():
-            return "goto"
-        case Wait():
-            return "wait"
-
-
-def speed_named_by(step: Step) -> float:
-    """Return the speed that a step names, m/s; 0 if it names none."""
-    match step:
-        case Move(speed=speed) | MoveTurned(speed=speed) | GoTo(speed=speed):
-            return speed or 0.0
-        case SetSpeed(speed=speed):
-            return speed or 0.0
-        case Drive(forward=forward) | Head(forward=forward):
-            return abs(forward)
-        case _:
-            return 0.0
-
 
 def steps_of(goal: Goal) -> tuple[Step, ...]:
     """Return the steps of a goal; one that is no plan is its only step."""
@@ -289,23 +124,3 @@ def ends_at_home(goal: Goal) -> bool:
     """Return whether the last place that a goal drives to is the vehicle's home."""
     driven = [step for step in steps_of(goal) if isinstance(step, SingleGoal)]
     return isinstance(driven[-1], GoTo) and driven[-1].place is None if driven else False
-
-
-def _describe_plan(plan: Plan) -> str:
-    if len(plan.steps) <= FEW_STEPS and not plan.has_home:  # with home it is a mission
-        unseen = Nothing | SetSpeed | SetReverse
-        driven = [step for step in plan.steps if not isinstance(step, unseen)]
-        if len(driven) == 1 and isinstance(driven[0], SingleGoal):
-            return describe(driven[0])  # the other steps are its speed and options
-    count = plan.item_count
-    return f"plan of {count} item{'s' if count != 1 else ''}"
-
-
-def _describe_way(place: Place | None) -> str:
-    match place:
-        case None:
-            return "return home"
-        case LocalPlace(north=north, east=east):
-            return f"go to {north:.2f} m N, {east:.2f} m E"
-        case GlobalPlace(latitude_degE7=latitude, longitude_degE7=longitude):
-            return f"go to {latitude / 1e7:.6f}, {longitude / 1e7:.6f}"

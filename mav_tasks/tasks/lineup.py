@@ -9,6 +9,7 @@ from math import inf
 from typing import NamedTuple
 
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import SingleGoal
 from mav_tasks.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.tasks.driving.bounds import Bounds, safe_braking
 from mav_tasks.tasks.driving.executor import Executor
@@ -23,7 +24,6 @@ from mav_tasks.tasks.events import (
     VehicleIdentified,
     VehicleSpeedSet,
 )
-from mav_tasks.tasks.goal import SingleGoal
 from mav_tasks.tasks.halts import DISABLED, Halts, Permit
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks

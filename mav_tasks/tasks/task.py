@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import NewType
 
-from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace
+from mav_tasks.kinds import GoTo, LocalPlace
+from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.timing import Timing
 

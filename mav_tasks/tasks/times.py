@@ -3,7 +3,7 @@
 from heapq import heapify, heappop, heappush
 from math import inf
 
-from mav_tasks.tasks.goal import Wait
+from mav_tasks.kinds import Wait
 from mav_tasks.tasks.task import Task, TaskId, Terms
 
 DAY, HOUR, MINUTE = 86_400.0, 3_600.0, 60.0  # s

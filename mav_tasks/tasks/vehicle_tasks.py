@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import inf
 
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import MoveTurned, Rotate
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.executor import has_moved
 from mav_tasks.tasks.driving.legs import leg_of
@@ -19,7 +20,7 @@ from mav_tasks.tasks.driving.mission_sequencer import (
 )
 from mav_tasks.tasks.driving.stage import is_off_line
 from mav_tasks.tasks.events import SERVER, QueueContinued
-from mav_tasks.tasks.goal import MoveTurned, Plan, Rotate
+from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, LastHalt
 from mav_tasks.tasks.lifecycle import (
     CONTINUE_FIRST,

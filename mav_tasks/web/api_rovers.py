@@ -5,9 +5,10 @@ from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
 from mav_tasks.client.aio import Client
-from mav_tasks.client.fence_form import PLACE, circle_of, polygon_of, shapes_of
+from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
 from mav_tasks.client.parts import EPOCH, VEHICLE_ID
 from mav_tasks.errors import MavTasksError, NoSuchVehicle, Refused
+from mav_tasks.kinds.goto import ON_EARTH
 from mav_tasks.plan_files import PlanFile
 from mav_tasks.setting_keys.parts import Part, schema_of
 from mav_tasks.setting_keys.shapes import LARGEST, Flag, Items, Number, Record
@@ -23,7 +24,7 @@ from mav_tasks.web.users import Line
 T = TypeVar("T")
 
 LIMIT = Part("limit", Number(0, 10_000, is_whole=True), "at most this many tasks")
-SPOT = schema_of(PLACE) | {"additionalProperties": True}
+SPOT = schema_of(ON_EARTH) | {"additionalProperties": True}
 FENCE = [
     NAME,
     text_part("contents of a .plan file with a fence", is_required=False),

@@ -7,9 +7,9 @@ from importlib.metadata import version
 
 from starlette.responses import Response, StreamingResponse
 
-from mav_tasks.client.goal_form import KINDS
 from mav_tasks.client.parts import KEY_TEXT
 from mav_tasks.errors import UsageError
+from mav_tasks.kinds.in_json import FORMS
 from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Text
@@ -58,7 +58,7 @@ def operations(services: Services) -> list[Operation]:
                         for number in kind.numbers
                     ],
                 }
-                for kind in KINDS
+                for kind in FORMS
             ],
             "priority": {"least": 0, "most": MAX_PRIORITY, "default": DEFAULT_PRIORITY},
             "label_bytes": MAX_LABEL,

@@ -8,8 +8,9 @@ from typing import Any
 
 from mav_tasks.client.aio import Client
 from mav_tasks.errors import StoreError
+from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import who_is
-from mav_tasks.tasks.goal import GoTo, Plan
+from mav_tasks.tasks.goal import Plan
 from mav_tasks.web.goal_places import places_of_goals
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live

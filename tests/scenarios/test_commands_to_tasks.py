@@ -3,19 +3,9 @@
 from collections.abc import Callable
 from math import nan, pi, radians
 
+from mav_tasks.kinds import Drive, Face, GlobalPlace, GoTo, Head, LocalPlace, Move, Rotate, Wait
 from mav_tasks.tasks.events import SubmissionRefused
-from mav_tasks.tasks.goal import (
-    Drive,
-    Face,
-    GlobalPlace,
-    Goal,
-    GoTo,
-    Head,
-    LocalPlace,
-    Move,
-    Rotate,
-    Wait,
-)
+from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from tests.kit.client import DRIVE, MOVE, ROTATE, FakeClient, Sent
 from tests.kit.rows import check

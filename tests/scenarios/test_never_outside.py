@@ -4,10 +4,10 @@ from collections.abc import Callable
 from math import cos, nan, pi, sin
 from random import Random
 
+from mav_tasks.kinds import GlobalPlace, LocalPlace
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
-from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Persona
 from tests.kit.cases import for_each

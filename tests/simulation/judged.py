@@ -12,10 +12,10 @@ from math import ceil, hypot, inf, remainder, tau
 from typing import Any
 from zlib import crc32
 
+from mav_tasks import kinds as g
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.snapshot import VehicleSnapshot
 from mav_tasks.links.memory import MemoryNet
-from mav_tasks.tasks import goal as g
 from mav_tasks.tasks.events import Event, TaskAssigned, TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored

@@ -8,10 +8,10 @@ from tempfile import TemporaryDirectory
 from time import monotonic, perf_counter
 
 from mav_tasks.engine.engine import Engine
+from mav_tasks.kinds import Move
 from mav_tasks.serve import tame_collector
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.store.sqlite import SqliteStore
-from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms

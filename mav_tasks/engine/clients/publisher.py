@@ -37,7 +37,6 @@ from mav_tasks.tasks.events import (
     TaskSubmitted,
     TaskWaits,
 )
-from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Task, TaskId
@@ -70,7 +69,7 @@ def next_words(tasks: VehicleTasks) -> str:
         return ""
     behind = len(tasks.waiting) - (task.id in tasks.waiting)
     wait = f"; {_waiting(behind)} behind it" if behind else ""
-    return f": task {task.id} is next, {describe(task.goal)}{wait}"
+    return f": task {task.id} is next, {task.goal.words}{wait}"
 
 
 def _waiting(count: int) -> str:

@@ -10,18 +10,11 @@ from typing import NamedTuple
 
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import SingleGoal
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import ROLES, Limits, Roles
 from mav_tasks.tasks.driving.estimate import MOST_STEPS, Known, time_left
-from mav_tasks.tasks.goal import (
-    Goal,
-    Perform,
-    Plan,
-    SingleGoal,
-    kind_of,
-    speed_named_by,
-    steps_of,
-)
+from mav_tasks.tasks.goal import Goal, Perform, Plan, steps_of
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, Terms
 
@@ -122,7 +115,8 @@ class Rights(NamedTuple):
                     self.require(role, words, moves=True)
         top = limits.max_speed
         if top < NO_LIMIT.max_speed:
-            fastest = max(map(speed_named_by, steps_of(goal)), default=0.0)
+            named = (getattr(step, "named_speed", 0.0) for step in steps_of(goal))
+            fastest = max(named, default=0.0)
             if fastest > top * SAME:
                 raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
 
@@ -150,8 +144,8 @@ def rights_of(key: Key, submitter: Submitter, roles: Roles) -> Rights:
 def _kinds_of(goal: Goal) -> list[str]:
     """Return the kinds of tasks in a goal; a plan of one step counts as that step."""
     if not isinstance(goal, Plan):
-        return [kind_of(goal)]
-    kinds = [kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]
+        return [goal.rule]
+    kinds = [step.rule for step in goal.steps if isinstance(step, SingleGoal)]
     if len(kinds) == 1 and not goal.has_home:
         return kinds
     return ["plan", *sorted(set(kinds))]

@@ -5,20 +5,10 @@ from typing import NamedTuple, TypeVar
 
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import Drive, Face, GoTo, Head, Move, MoveTurned, Rotate, SingleGoal
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Turning
-from mav_tasks.tasks.goal import (
-    Drive,
-    Face,
-    GoTo,
-    Head,
-    Move,
-    MoveTurned,
-    Rotate,
-    SetReverse,
-    SingleGoal,
-    Step,
-)
+from mav_tasks.tasks.goal import SetReverse, Step
 from mav_tasks.tasks.lifecycle import TaskReason
 
 

@@ -12,11 +12,7 @@ from struct import Struct
 
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.enums import MavCmd, MavFrame
-from mav_tasks.mavlink.float_param import EXACT, large_number
-from mav_tasks.services.commands import Command
-from mav_tasks.settings import Driving
-from mav_tasks.tasks.goal import (
+from mav_tasks.kinds import (
     Drive,
     Face,
     GlobalPlace,
@@ -29,6 +25,10 @@ from mav_tasks.tasks.goal import (
     SingleGoal,
     Wait,
 )
+from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.mavlink.float_param import EXACT, large_number
+from mav_tasks.services.commands import Command
+from mav_tasks.settings import Driving
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Marks, Terms
 from mav_tasks.tasks.times import DAY, HOUR, MINUTE

@@ -18,9 +18,10 @@ from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.parts import Starter
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
-from mav_tasks.tasks.goal import GoTo, Plan
+from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
 from mav_tasks.tasks.task import Draft, Submitter, Terms
 

@@ -21,12 +21,12 @@ from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.engine.timers import Effect, Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, SubmissionDeduplicator
 from mav_tasks.tasks.forecast import known_when_empty
-from mav_tasks.tasks.goal import GoTo, describe
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
@@ -394,7 +394,7 @@ def _priority_of(submitter: Submitter, settings: Settings) -> int:
 
 def accepted_words(asked: CommandRequest, task: Task) -> str:
     """Return what becomes of a new task: it starts, is queued, or waits for a button."""
-    tasks, goal = asked.vehicle.tasks, describe(task.goal)
+    tasks, goal = asked.vehicle.tasks, task.goal.words
     if tasks.immediate == task.id:
         return f"Task {task.id} starts now: {goal}"
     if paused := tasks.paused:  # somebody else may have paused

@@ -5,6 +5,7 @@
 
 from math import isfinite, nan
 
+from mav_tasks.kinds import Face, GoTo, Move, MoveTurned, Rotate
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -27,7 +28,7 @@ from mav_tasks.tasks.events import (
     VehicleSeen,
 )
 from mav_tasks.tasks.forecast import Forecast, estimate, known_of, position, wait_reason
-from mav_tasks.tasks.goal import Face, Goal, GoTo, Move, MoveTurned, Plan, Rotate, describe
+from mav_tasks.tasks.goal import Goal, Plan
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.timing import Timing
@@ -331,7 +332,7 @@ def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
 def _words(task: Task, reason: TaskReason, says: str) -> str:
     """Return a task, its state and reason as text; ``says``: the vehicle's own text on it."""
     label = f" '{task.terms.label}'" if task.terms.label else ""
-    words = f"{describe(task.goal)}{label}: {STATES[task.state]}"
+    words = f"{task.goal.words}{label}: {STATES[task.state]}"
     if not reason:
         return words
     return f"{words} ({words_of(reason)}: {says})" if says else f"{words} ({words_of(reason)})"

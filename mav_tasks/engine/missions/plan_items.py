@@ -29,6 +29,7 @@ from mav_tasks.engine.missions.plan_table import (
     step_of_command,
 )
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import GlobalPlace, GoTo, Place
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
@@ -37,18 +38,7 @@ from mav_tasks.services.missions import Item, packed, unpacked
 from mav_tasks.tasks.driving.fence import Circle, Fence, Polygon, Zone, check
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import loops_in_vain
-from mav_tasks.tasks.goal import (
-    GlobalPlace,
-    Goal,
-    GoTo,
-    Jump,
-    Near,
-    Nothing,
-    Place,
-    Plan,
-    Step,
-    number_of,
-)
+from mav_tasks.tasks.goal import Goal, Jump, Near, Nothing, Plan, Step, number_of
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import MAX_NONCE, Terms
 

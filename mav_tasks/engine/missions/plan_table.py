@@ -25,24 +25,13 @@ from mav_tasks.engine.commands.goals import (
 )
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import GoTo, Place, Wait
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
 from mav_tasks.services.commands import Command
 from mav_tasks.services.missions import NOT_GIVEN
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.goal import (
-    Delay,
-    GoTo,
-    Jump,
-    Near,
-    Nothing,
-    Perform,
-    Place,
-    SetReverse,
-    SetSpeed,
-    Step,
-    Wait,
-)
+from mav_tasks.tasks.goal import Delay, Jump, Near, Nothing, Perform, SetReverse, SetSpeed, Step
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, Terms
 

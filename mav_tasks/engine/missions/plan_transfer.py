@@ -45,6 +45,7 @@ from mav_tasks.engine.missions.transfer import MissionParts, Sender, Transfer, U
 from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavResult, MavSeverity
@@ -54,7 +55,7 @@ from mav_tasks.services.missions import Item, item_of, packed
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import reused
 from mav_tasks.tasks.events import SubmissionRefused
-from mav_tasks.tasks.goal import GoTo, Plan, Step, describe, number_of
+from mav_tasks.tasks.goal import Plan, Step, number_of
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.task import ANY, Draft, Marks, Submitter
 
@@ -303,7 +304,7 @@ class PlanTransfer(Transfer):
                 active = vehicle.tasks.active
                 if active is not None and is_of_autopilot(active) and not vehicle.tasks.paused:
                     what += f", task {active.id} goes on until then"
-            words = f"Task {task.id} {what}: {describe(task.goal)}{skipped(task.goal)}"
+            words = f"Task {task.id} {what}: {task.goal.words}{skipped(task.goal)}"
             words += chosen_words(task)
             parts.gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 

@@ -10,6 +10,7 @@ the settling distance is good enough, and the task's status shows it.
 
 from math import radians
 
+from mav_tasks.kinds import Move, Rotate
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import (
     APPROACH_GAIN,
@@ -22,7 +23,6 @@ from mav_tasks.tasks.driving.guidance import (
     Velocity,
 )
 from mav_tasks.tasks.driving.path_follower import PathFollower
-from mav_tasks.tasks.goal import Move, Rotate
 
 CORRECTIONS = 2  # corrections of the end from a standstill
 STALLED = 4.0  # s without progress, within the settling distance, after which it stops

@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
+from mav_tasks.kinds import Face, GoTo, MoveTurned, Rotate, Wait
 from mav_tasks.settings import Driving, Settings, Turning
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
@@ -29,15 +30,7 @@ from mav_tasks.tasks.driving.stage import (
     set_out,
 )
 from mav_tasks.tasks.driving.watches import AstrayWatch, Follows, StuckWatch
-from mav_tasks.tasks.goal import (
-    Face,
-    GoTo,
-    MoveTurned,
-    Near,
-    Plan,
-    Rotate,
-    Wait,
-)
+from mav_tasks.tasks.goal import Near, Plan
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Progress, Task

@@ -8,25 +8,14 @@ from dataclasses import replace
 from math import nan, sqrt
 from typing import NamedTuple
 
+from mav_tasks.kinds import Drive, Face, GlobalPlace, GoTo, Head, Move, Rotate, SingleGoal
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.guidance import wrap
 from mav_tasks.tasks.driving.legs import WAY, anchor_of, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import begun, following, is_over, present_goal
 from mav_tasks.tasks.driving.path import Follow, moved
-from mav_tasks.tasks.goal import (
-    Drive,
-    Face,
-    GlobalPlace,
-    Goal,
-    GoTo,
-    Head,
-    Move,
-    Plan,
-    Rotate,
-    SetSpeed,
-    SingleGoal,
-)
+from mav_tasks.tasks.goal import Goal, Plan, SetSpeed
 from mav_tasks.tasks.task import Pose, Progress
 
 SETTLING = 1.5  # s from one task's end to motion, and from near its end to a measured standstill

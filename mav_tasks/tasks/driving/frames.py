@@ -8,7 +8,7 @@ two places are metres apart at 10 km.
 
 from math import cos, radians
 
-from mav_tasks.tasks.goal import GlobalPlace, LocalPlace, Place
+from mav_tasks.kinds import GlobalPlace, LocalPlace, Place
 
 METRES_PER_DEGE7 = 0.011131884502145034
 HALF_TURN = 1_800_000_000  # degE7

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import atan, atan2, copysign, cos, hypot, inf, pi, radians, sin, sqrt, tan
 from typing import NamedTuple
 
+from mav_tasks.kinds import Drive, Head, Move, Rotate, Wait
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.path import (
     Follow,
@@ -19,7 +20,6 @@ from mav_tasks.tasks.driving.path import (
     path_length,
     pose_on,
 )
-from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
 from mav_tasks.tasks.task import Pose
 
 #: the goals that can be steered; ``legs`` splits every goal into these

@@ -8,9 +8,7 @@ task drives the very same ones.
 from dataclasses import replace
 from math import copysign, pi, tau
 
-from mav_tasks.tasks.driving.guidance import Leg, wrap
-from mav_tasks.tasks.driving.path import Follow, bearing, distance, moved, path_length
-from mav_tasks.tasks.goal import (
+from mav_tasks.kinds import (
     Drive,
     Face,
     GoTo,
@@ -22,6 +20,8 @@ from mav_tasks.tasks.goal import (
     SingleGoal,
     Wait,
 )
+from mav_tasks.tasks.driving.guidance import Leg, wrap
+from mav_tasks.tasks.driving.path import Follow, bearing, distance, moved, path_length
 from mav_tasks.tasks.task import Pose, Progress
 
 #: the legs of a GoTo: face the place (as a car: drive to where the last run to it begins), drive

@@ -11,21 +11,18 @@ from graphlib import CycleError, TopologicalSorter
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.kinds import GoTo, LocalPlace, SingleGoal, Wait
 from mav_tasks.tasks.goal import (
     Delay,
     Goal,
-    GoTo,
     Jump,
-    LocalPlace,
     Near,
     OnTheWay,
     Perform,
     Plan,
     SetReverse,
     SetSpeed,
-    SingleGoal,
     Step,
-    Wait,
     steps_of,
 )
 from mav_tasks.tasks.task import Progress, Task

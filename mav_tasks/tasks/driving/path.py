@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from math import atan2, copysign, hypot, pi, tau
 
-from mav_tasks.tasks.goal import LocalPlace
+from mav_tasks.kinds import LocalPlace
 from mav_tasks.tasks.task import Bend, Pose
 
 Spot = LocalPlace | Pose

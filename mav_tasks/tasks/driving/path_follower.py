@@ -3,13 +3,13 @@
 from dataclasses import dataclass, replace
 from math import copysign
 
+from mav_tasks.kinds import GoTo, Head, SingleGoal
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving import guidance
 from mav_tasks.tasks.driving.guidance import USUAL, Leg, Line, Motion, Slowest, Velocity
 from mav_tasks.tasks.driving.legs import FACE, WAY, begun_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.path import Follow, distance
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
-from mav_tasks.tasks.goal import GoTo, Head, SingleGoal
 from mav_tasks.tasks.task import Pose, Progress
 
 BESIDE = 0.15  # m from a place, at the end of the way there; farther off has missed it

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import atan2, copysign, pi, remainder, sqrt, tau
 
+from mav_tasks.kinds import GoTo, LocalPlace
 from mav_tasks.tasks.driving.fence import LocalFence
 from mav_tasks.tasks.driving.legs import FACE, WAY
 from mav_tasks.tasks.driving.path import (
@@ -27,7 +28,6 @@ from mav_tasks.tasks.driving.path import (
     runs_of,
     turn_of,
 )
-from mav_tasks.tasks.goal import GoTo, LocalPlace
 from mav_tasks.tasks.task import Bend, Pose, Progress
 
 #: factor on the turning radius: a planned bend leaves room to steer

@@ -8,6 +8,7 @@ would have ended.
 from dataclasses import replace
 from math import copysign, inf, pi, radians
 
+from mav_tasks.kinds import Face, GoTo, LocalPlace, Move, Rotate, SingleGoal
 from mav_tasks.settings import Driving, Turning
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.guidance import Motion, bend_speed, corner_speed, wrap
@@ -33,7 +34,7 @@ from mav_tasks.tasks.driving.path import (
 )
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to, way_to_pose
-from mav_tasks.tasks.goal import Face, GoTo, LocalPlace, Move, Plan, Rotate, SingleGoal
+from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.task import Pose, Progress, Task
 from mav_tasks.tasks.view import VehicleView, place_of
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import cos, pi, radians, sin
 
 from mav_tasks.client.wire import Goal
-from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate
+from mav_tasks.kinds import GoTo, LocalPlace, Move, Rotate
 from rover_sim.field_trial.track import Place
 
 COUNT = 30  # tasks to drive

@@ -1,6 +1,5 @@
 """The report of a failing test: seed, rovers, tasks, events and texts."""
 
-from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import words_of
 from mav_tasks.tasks.task import Task
 from rover_sim.testing.rover_world import RoverWorld
@@ -27,7 +26,7 @@ def describe_world(world: RoverWorld) -> str:
 def _line_of(task: Task) -> str:
     why = f" ({words_of(task.reason)})" if task.reason else ""
     state = task.state.name.lower()
-    return f"{task.id:6} of rover {task.vehicle}: {describe(task.goal)}: {state}{why}"
+    return f"{task.id:6} of rover {task.vehicle}: {task.goal.words}: {state}{why}"
 
 
 def _part(title: str, lines: list[str]) -> list[str]:

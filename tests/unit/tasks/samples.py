@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 
+from mav_tasks.kinds import Move
 from mav_tasks.tasks.driving.guidance import Motion
-from mav_tasks.tasks.goal import Goal, Move
+from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Pose, Submitter, Terms
 from mav_tasks.tasks.view import ModeKind, VehicleView

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.kinds import GlobalPlace, LocalPlace
 from mav_tasks.tasks.driving.frames import to_global, to_local
-from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 
 RESOLUTION = 0.0112  # m, of the integers
 

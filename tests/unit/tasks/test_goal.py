@@ -1,20 +1,7 @@
 """Goals in words, as people at a terminal or a ground station read them."""
 
-from mav_tasks.tasks.goal import (
-    Drive,
-    Face,
-    Goal,
-    GoTo,
-    Jump,
-    LocalPlace,
-    Move,
-    Nothing,
-    Plan,
-    SetSpeed,
-    Wait,
-    describe,
-    kind_of,
-)
+from mav_tasks.kinds import Drive, Face, GoTo, LocalPlace, Move, Wait
+from mav_tasks.tasks.goal import Goal, Jump, Nothing, Plan, SetSpeed
 
 PLACE = GoTo(LocalPlace(1.0, -2.0))
 
@@ -47,6 +34,6 @@ def test_goals_in_words() -> None:
         Plan((Nothing(), PLACE), has_home=True),
         Plan((Wait(1.0), Jump(0, 3))),
     )
-    assert [describe(goal) for goal in goals] == WORDS.splitlines()
-    kinds = [kind_of(goal) for goal in (Drive(1.0, 0.0, 1.0), GoTo(None), Wait(1.0))]
+    assert [goal.words for goal in goals] == WORDS.splitlines()
+    kinds = [goal.rule for goal in (Drive(1.0, 0.0, 1.0), GoTo(None), Wait(1.0))]
     assert kinds == ["drive", "return", "wait"]

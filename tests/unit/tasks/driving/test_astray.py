@@ -4,12 +4,12 @@ from math import cos, hypot, pi, radians, sin
 
 import pytest
 
+from mav_tasks.kinds import Drive, Move, SingleGoal
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.stage import OFF_TRACK
 from mav_tasks.tasks.driving.watches import WRONG_WAY, AstrayWatch, JumpWatch
-from mav_tasks.tasks.goal import Drive, Move, SingleGoal
 from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN
 

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.kinds import Move, Rotate, Wait
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import (
     CREEP_SPEED,
@@ -17,7 +18,6 @@ from mav_tasks.tasks.driving.guidance import (
     steer,
     wrap,
 )
-from mav_tasks.tasks.goal import Move, Rotate, Wait
 from mav_tasks.tasks.task import Pose
 
 DRIVING = Driving()

@@ -4,6 +4,7 @@ from math import pi, radians
 
 import pytest
 
+from mav_tasks.kinds import Face, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.driving.legs import (
     FACE,
     WAY,
@@ -13,7 +14,6 @@ from mav_tasks.tasks.driving.legs import (
     leg_of,
 )
 from mav_tasks.tasks.driving.path import bearing
-from mav_tasks.tasks.goal import Face, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN
 

@@ -5,6 +5,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.kinds import GoTo, LocalPlace, Wait
 from mav_tasks.tasks.driving.mission_sequencer import (
     END,
     following,
@@ -14,19 +15,7 @@ from mav_tasks.tasks.driving.mission_sequencer import (
     present_goal,
     started,
 )
-from mav_tasks.tasks.goal import (
-    Delay,
-    GoTo,
-    Jump,
-    LocalPlace,
-    Near,
-    Nothing,
-    Perform,
-    Plan,
-    SetSpeed,
-    Step,
-    Wait,
-)
+from mav_tasks.tasks.goal import Delay, Jump, Near, Nothing, Perform, Plan, SetSpeed, Step
 from mav_tasks.tasks.task import Progress
 
 A, B, C = (GoTo(LocalPlace(float(n), 0.0)) for n in range(3))

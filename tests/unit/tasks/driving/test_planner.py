@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.kinds import GlobalPlace, GoTo, LocalPlace
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
 from mav_tasks.tasks.driving.frames import to_global
@@ -28,7 +29,6 @@ from mav_tasks.tasks.driving.planner import (
     way_to,
     way_to_pose,
 )
-from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace
 from mav_tasks.tasks.task import Bend, Pose, Progress
 from tests.unit.tasks.samples import motion
 

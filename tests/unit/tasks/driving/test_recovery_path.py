@@ -7,6 +7,7 @@ from typing import Any
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from mav_tasks.kinds import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import Motion, wrap
 from mav_tasks.tasks.driving.path_follower import PathFollower
@@ -20,7 +21,6 @@ from mav_tasks.tasks.driving.stage import (
     resumed,
     was_handled,
 )
-from mav_tasks.tasks.goal import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.task import Bend, Marks, Pose, Progress, Task, TaskId
 from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE, motion
 

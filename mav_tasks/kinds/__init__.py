@@ -1,0 +1,28 @@
+"""The kinds of tasks: each file has what a kind is, its words, and its form in JSON.
+
+SI units and radians; angles clockwise from north. Frozen values.
+"""
+
+from mav_tasks.kinds.drive import Drive, Head
+from mav_tasks.kinds.goto import GlobalPlace, GoTo, LocalPlace, Place
+from mav_tasks.kinds.move import Move, MoveTurned
+from mav_tasks.kinds.rotate import Face, Rotate
+from mav_tasks.kinds.wait import Wait
+
+#: a goal that drives on its own: a task's goal, or a step of a plan
+SingleGoal = Move | MoveTurned | Rotate | Drive | GoTo | Face | Head | Wait
+
+__all__ = [
+    "Drive",
+    "Face",
+    "GlobalPlace",
+    "GoTo",
+    "Head",
+    "LocalPlace",
+    "Move",
+    "MoveTurned",
+    "Place",
+    "Rotate",
+    "SingleGoal",
+    "Wait",
+]

@@ -1,0 +1,59 @@
+"""Drive and Head: keep a velocity for a time, with a yaw rate or on a heading."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mav_tasks.kinds.form import DEGREE, DURATION, Form, any_number
+from mav_tasks.setting_keys.parts import Part
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Keep a velocity for a time: m/s forward, rad/s clockwise, ``duration`` in seconds."""
+
+    rule: ClassVar[str] = "drive"
+    forward: float
+    yaw_rate: float
+    duration: float
+
+    @property
+    def words(self) -> str:
+        return f"drive {self.forward:g} m/s for {self.duration:g} s"
+
+    @property
+    def named_speed(self) -> float:
+        return abs(self.forward)
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """Drive towards a heading for a time: ``yaw`` in radians, ``forward`` in m/s.
+
+    ``is_relative``: the yaw counts from the heading at the start.
+    """
+
+    rule: ClassVar[str] = "drive"
+    yaw: float
+    forward: float
+    duration: float
+    is_relative: bool = False
+
+    @property
+    def words(self) -> str:
+        return f"drive {self.forward:g} m/s on a heading for {self.duration:g} s"
+
+    @property
+    def named_speed(self) -> float:
+        return abs(self.forward)
+
+
+FORM = Form(
+    "drive",
+    "Drive at a constant velocity for some time.",
+    (
+        Part("forward", any_number("m/s"), "speed; negative: backwards", True),
+        Part("yaw_rate", any_number("deg/s", DEGREE), "yaw rate; positive: clockwise", True),
+        DURATION,
+    ),
+    Drive,
+)

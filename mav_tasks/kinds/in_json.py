@@ -1,0 +1,35 @@
+"""Goals as JSON, for the HTTP API and agents: ``{"kind": "goto", "north": 4, "east": -2}``."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mav_tasks.errors import SettingError
+from mav_tasks.kinds import drive, goto, move, rotate, wait
+from mav_tasks.setting_keys.parts import read_all, shortened
+
+ROTATE, FACE = rotate.FORMS
+GOTO, GOTO_GLOBAL, HOME = goto.FORMS
+#: in the order in which they are offered
+FORMS = (move.FORM, ROTATE, drive.FORM, GOTO, GOTO_GLOBAL, FACE, wait.FORM, HOME)
+BY_NAME = {form.name: form for form in FORMS}
+
+
+def goal_schema() -> dict[str, Any]:
+    """Return the JSON schema of a goal of any kind."""
+    return {"oneOf": [form.schema for form in FORMS]}
+
+
+def goals_of(values: Sequence[object]) -> list[Any]:
+    """Return the goals of a request. Raise SettingError that names the part that is invalid."""
+    return [_goal_of(value, f"goals[{at}]") for at, value in enumerate(values)]
+
+
+def _goal_of(value: object, name: str) -> Any:
+    if not isinstance(value, Mapping):
+        raise SettingError(f"{name}: expected an object, such as {{'kind': 'move', 'distance': 2}}")
+    form = BY_NAME.get(value["kind"]) if isinstance(value.get("kind"), str) else None
+    if form is None:
+        words = f"expected one of {', '.join(BY_NAME)}"
+        raise SettingError(f"{name}.kind {shortened(value.get('kind'))}: {words}")
+    numbers = {part: number for part, number in value.items() if part != "kind"}
+    return form.make(**read_all(form.numbers, numbers, f"{name}."))

@@ -1,0 +1,55 @@
+"""Move: drive straight along the heading at the start."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mav_tasks.kinds.form import SPEED, Form, any_number
+from mav_tasks.setting_keys.parts import Part
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Drive straight along the heading at the start.
+
+    ``distance`` in metres, negative = backwards; ``speed`` in m/s, positive, None = default.
+    """
+
+    rule: ClassVar[str] = "move"
+    distance: float
+    speed: float | None = None
+
+    @property
+    def words(self) -> str:
+        return f"move {self.distance:g} m"
+
+    @property
+    def named_speed(self) -> float:
+        return self.speed or 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class MoveTurned:
+    """Move backwards with a vehicle that cannot reverse: turn round, drive, turn back.
+
+    ``distance`` in metres, positive; ``speed`` as in Move.
+    """
+
+    rule: ClassVar[str] = "move"
+    distance: float
+    speed: float | None = None
+
+    @property
+    def words(self) -> str:
+        return f"move {-self.distance:g} m"
+
+    @property
+    def named_speed(self) -> float:
+        return self.speed or 0.0
+
+
+FORM = Form(
+    "move",
+    "Drive straight along the heading that the rover has at the start.",
+    (Part("distance", any_number("m"), "distance; negative: backwards", True), SPEED),
+    Move,
+)

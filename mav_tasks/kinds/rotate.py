@@ -1,0 +1,73 @@
+"""Rotate and Face: turn on the spot, by an angle or to a heading."""
+
+from dataclasses import dataclass
+from math import degrees
+from typing import ClassVar
+
+from mav_tasks.kinds.form import DEGREE, HEADING, RATE, Form, any_number
+from mav_tasks.setting_keys.parts import Part
+from mav_tasks.setting_keys.shapes import Number
+
+
+@dataclass(frozen=True, slots=True)
+class Rotate:
+    """Turn on the spot: ``angle`` in radians, clockwise positive, may exceed a full turn.
+
+    ``rate`` in rad/s, positive, None = default.
+    """
+
+    rule: ClassVar[str] = "rotate"
+    named_speed: ClassVar[float] = 0.0
+    angle: float
+    rate: float | None = None
+
+    @property
+    def words(self) -> str:
+        return f"rotate {degrees(self.angle):.6g} deg"
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """Turn on the spot to a heading.
+
+    ``yaw`` in radians from north; ``direction`` 1 clockwise, -1 counter-clockwise, 0 the shorter
+    way; ``rate`` in rad/s, None = default.
+    """
+
+    rule: ClassVar[str] = "rotate"
+    named_speed: ClassVar[float] = 0.0
+    yaw: float
+    direction: int = 0
+    rate: float | None = None
+
+    @property
+    def words(self) -> str:
+        return f"face {degrees(self.yaw) % 360:.6g} deg"
+
+
+def _face(heading: float, direction: int | None, rate: float | None) -> Face:
+    return Face(heading, direction or 0, rate)
+
+
+FORMS = (
+    Form(
+        "rotate",
+        "Turn on the spot by an angle.",
+        (Part("angle", any_number("deg", DEGREE), "angle; positive: clockwise", True), RATE),
+        Rotate,
+    ),
+    Form(
+        "face",
+        "Turn on the spot to a heading.",
+        (
+            Part("heading", any_number("deg", DEGREE), HEADING, True),
+            Part(
+                "direction",
+                Number(-1, 1, is_whole=True),
+                "1 clockwise, -1 counter-clockwise, 0 or not given: the shorter",
+            ),
+            RATE,
+        ),
+        _face,
+    ),
+)

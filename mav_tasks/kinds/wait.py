@@ -1,0 +1,29 @@
+"""Wait: stand for a time, or until a time of day."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mav_tasks.kinds.form import DURATION, Form
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Stand for ``duration`` seconds.
+
+    With ``until`` it stands until that time of day (UTC), and ``duration`` is when it comes again:
+    hour, minute and second, of which the first ones may be -1 = any.
+    """
+
+    rule: ClassVar[str] = "wait"
+    named_speed: ClassVar[float] = 0.0
+    duration: float
+    until: tuple[int, ...] = ()
+
+    @property
+    def words(self) -> str:
+        if self.until:
+            return f"wait until {':'.join(f'{part:02}' for part in self.until)} UTC"
+        return f"wait {self.duration:g} s"
+
+
+FORM = Form("wait", "Stand still.", (DURATION,), Wait)
