@@ -179,7 +179,8 @@ def stop(it: MavProxy, running: Stand) -> None:
 def plans(it: MavProxy, folder: Path) -> None:
     way = [(0, WAYPOINT, 0.0, *HOME), *((3, WAYPOINT, 0.0, *place) for place in PLACES)]
     load(it, "wp", way, folder)
-    assert "AP: Task 2 ready to start: plan of 2 items" in it.text
+    told = "AP: Task 2 ready to start: plan of 2 items"
+    wait_until(lambda: told in it.text, within=10, what=told)
     it.ask("wp set 2", "DO_SET_MISSION_CURRENT: ACCEPTED")
     it.wait_for("waypoint 2")
     it.ask("wp set 1", "waypoint 1")
