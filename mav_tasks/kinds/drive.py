@@ -49,6 +49,7 @@ class Head:
 
 FORM = Form(
     "drive",
+    "Drive at a velocity",
     "Drive at a constant velocity for some time.",
     (
         Part("forward", any_number("m/s"), "speed; negative: backwards", True),

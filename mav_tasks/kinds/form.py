@@ -19,6 +19,7 @@ class Form:
     """The form of one kind; ``make`` takes the kept values of its numbers by their names."""
 
     name: str
+    title: str  # for a list from which a person chooses
     meaning: str
     numbers: tuple[Part, ...]
     make: Callable[..., Any]

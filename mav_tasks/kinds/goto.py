@@ -98,6 +98,7 @@ ON_ARRIVAL = (
 FORMS = (
     Form(
         "goto",
+        "Go to (metres)",
         "Drive to a place in the rover's local frame.",
         (
             Part("north", any_number("m"), "metres north of the local origin", True),
@@ -107,6 +108,12 @@ FORMS = (
         ),
         _local,
     ),
-    Form("goto_global", "Drive to a place on earth.", (*ON_EARTH, SPEED, *ON_ARRIVAL), _global),
-    Form("home", "Return to the nearest rally point, else home.", (SPEED,), _home),
+    Form(
+        "goto_global",
+        "Go to (latitude, longitude)",
+        "Drive to a place on earth.",
+        (*ON_EARTH, SPEED, *ON_ARRIVAL),
+        _global,
+    ),
+    Form("home", "Return home", "Return to the nearest rally point, else home.", (SPEED,), _home),
 )

@@ -49,6 +49,7 @@ class MoveTurned:
 
 FORM = Form(
     "move",
+    "Move straight",
     "Drive straight along the heading that the rover has at the start.",
     (Part("distance", any_number("m"), "distance; negative: backwards", True), SPEED),
     Move,

@@ -52,12 +52,14 @@ def _face(heading: float, direction: int | None, rate: float | None) -> Face:
 FORMS = (
     Form(
         "rotate",
+        "Turn by an angle",
         "Turn on the spot by an angle.",
         (Part("angle", any_number("deg", DEGREE), "angle; positive: clockwise", True), RATE),
         Rotate,
     ),
     Form(
         "face",
+        "Face a heading",
         "Turn on the spot to a heading.",
         (
             Part("heading", any_number("deg", DEGREE), HEADING, True),

@@ -26,4 +26,4 @@ class Wait:
         return f"wait {self.duration:g} s"
 
 
-FORM = Form("wait", "Stand still.", (DURATION,), Wait)
+FORM = Form("wait", "Wait", "Stand still.", (DURATION,), Wait)

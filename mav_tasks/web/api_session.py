@@ -45,6 +45,7 @@ def operations(services: Services) -> list[Operation]:
             "goals": [
                 {
                     "kind": kind.name,
+                    "title": kind.title,
                     "meaning": kind.meaning,
                     "numbers": [
                         {

@@ -122,6 +122,7 @@ POINT: Schema = {
 KIND = whole(
     {
         "kind": TEXT,
+        "title": TEXT,
         "meaning": TEXT,
         "numbers": listed(
             whole(

@@ -7,18 +7,13 @@ import { h } from "./dom.js";
 import { change, choose, state } from "./store.js";
 import { taskName } from "./words.js";
 
-const NAMES = {
-  move: "Move straight", rotate: "Turn by an angle", drive: "Drive at a velocity", goto: "Go to (metres)",
-  goto_global: "Go to (latitude, longitude)", face: "Face a heading", wait: "Wait", home: "Return home",
-};
-
 const ANY = "any"; // as the API calls it
 const ANY_WORDS = "The server chooses the rover that would begin it first, and chooses again if that one is lost before the task begins. The page then shows that rover's queue.";
 
 /** Open the form for a rover, with the parts of a goal filled in; where there are several, any of them can be chosen. */
 export function openTaskForm(vehicle, goal = {}) {
   const kinds = state.session.goals;
-  const select = h("select", { name: "kind" }, ...kinds.map((kind) => h("option", { value: kind.kind, selected: kind.kind === goal.kind }, NAMES[kind.kind] ?? kind.kind)));
+  const select = h("select", { name: "kind" }, ...kinds.map((kind) => h("option", { value: kind.kind, selected: kind.kind === goal.kind }, kind.title)));
   const meaning = h("small");
   const numbers = h("div", { class: "fields" });
   let defaults = {};
