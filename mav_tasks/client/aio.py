@@ -33,6 +33,7 @@ from mav_tasks.client.watch import Followed
 from mav_tasks.client.wire import SERVER, Goal, TaskOptions
 from mav_tasks.errors import ClientError, LinkDown, MavTasksError, NoAnswer, Refused
 from mav_tasks.kinds import Drive, Move, Rotate
+from mav_tasks.kinds.sent import check_size
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -270,7 +271,7 @@ class Client:
             if name in PROPERTIES and value is not None
         }
         for name in ("deadline", "delay"):
-            wire.check_size(name, numbers.get(name, 0.0))
+            check_size(name, numbers.get(name, 0.0))
         for name in filter(numbers.__contains__, PROPERTIES):
             params = to_param(task_id), float(PROPERTIES[name]), numbers[name]
             await self._control(vehicle, MavCmd.TASK_MODIFY, *params)

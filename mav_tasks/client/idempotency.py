@@ -9,7 +9,7 @@ and refuses a key that only looks like another one. It never takes one task for 
 from hashlib import sha256
 from typing import NamedTuple
 
-from mav_tasks.client.wire import LARGEST
+from mav_tasks.kinds.sent import LARGEST
 from mav_tasks.tasks.task import MAX_NONCE
 
 LONGEST = 200  # characters of a key

@@ -7,9 +7,10 @@ submissions are two tasks.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import degrees, isfinite
+from math import isfinite
 
-from mav_tasks.kinds import Drive, Face, GlobalPlace, GoTo, LocalPlace, Move, Place, Rotate, Wait
+from mav_tasks.kinds import Drive, Face, GoTo, Move, Rotate, Wait
+from mav_tasks.kinds.sent import LARGEST, check_numbers, check_size
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
@@ -25,17 +26,6 @@ Command = m.CommandLong | m.CommandInt
 
 #: the address of the task server itself, where it takes tasks for any of its rovers
 SERVER = Address(250, 191)
-
-LOCAL_SCALE = 1e4  # x and y in a local frame are in units of 0.1 mm
-LARGEST = 0x7FFFFFFE  # largest x and y; INT32_MAX means "not given"
-ON_THE_SPOT = 0.01  # m, acceptance radius if none is given
-STOPPING = 0.01  # s, least hold time of a stop: a waypoint without hold is passed
-NORTH = 360.0  # deg, sent for north: 0 would mean "no heading"
-LEAST_YAW = 1e-4  # deg; a smaller yaw is sent as NORTH
-#: numbers between these are float32s, also in degrees; others become 0 or infinite
-LEAST, MOST = 1e-37, 1e36
-EXACT = ("yaw", "north", "east")  # sent as integers, or else as NORTH
-OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: the configured speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +72,10 @@ def command_of(
     goal: Move | Rotate | Drive, terms: TaskOptions, *, target: tuple[int, int], nonce: int
 ) -> m.CommandLong:
     """Return the command that submits a goal. The deadline is set afterwards."""
-    own = _own(goal)
+    check_numbers(goal)
+    (own,) = goal.sent
     options = to_param(nonce), to_param(terms.after), terms.delay, float(terms.priority)
-    return m.CommandLong(*target, own[0], 0, *own[1:], *options)
+    return m.CommandLong(*target, own.command, 0, *own[1:4], *options)
 
 
 def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
@@ -92,7 +83,10 @@ def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
     for goal in goals:
         if not isinstance(goal, Goal):
             raise ValueError(f"{goal!r}: expected a goal, such as Move(2.0)")
-    return tuple(item for goal in goals for item in _items(goal))
+        check_numbers(goal)
+    return tuple(
+        Item(i.frame, i.command, 0, 1, *i[1:5], i.x, i.y, 0.0) for goal in goals for i in goal.sent
+    )
 
 
 def items_of_file(items: Sequence[PlanItem]) -> tuple[Item, ...]:
@@ -135,94 +129,8 @@ def options_of(terms: TaskOptions, *, nonce: int, check: int = 0) -> Item:
     one, and lets the server recognize a late copy. A plan with this nonce and another ``check``
     is another plan, which the server refuses.
     """
-    after, priority = to_param(terms.after), float(terms.priority)
-    options = _item(MavCmd.TASK_OPTIONS, priority, terms.delay, terms.deadline, after)
-    return options._replace(x=nonce, y=check)
-
-
-def _own(goal: Move | Rotate | Drive) -> tuple[int, float, float, float]:
-    match goal:
-        case Move():
-            _numbers(goal, distance=goal.distance, speed=goal.speed or 0.0)
-            return MavCmd.TASK_MOVE, goal.distance, goal.speed or 0.0, 0.0
-        case Rotate():
-            _numbers(goal, angle=goal.angle, rate=goal.rate or 0.0)
-            return MavCmd.TASK_ROTATE, degrees(goal.angle), degrees(goal.rate or 0.0), 0.0
-        case _:
-            _numbers(goal, forward=goal.forward, yaw_rate=goal.yaw_rate, duration=goal.duration)
-            return MavCmd.TASK_DRIVE, goal.forward, degrees(goal.yaw_rate), goal.duration
-
-
-def _items(goal: Goal) -> tuple[Item, ...]:
-    match goal:
-        case Move() | Rotate() | Drive():
-            return (_item(*_own(goal), 0.0),)
-        case Wait(duration=duration):
-            _numbers(goal, duration=duration)
-            return (_item(MavCmd.NAV_DELAY, duration, 0.0, 0.0, 0.0),)
-        case Face(yaw=yaw, direction=direction, rate=rate):
-            _numbers(goal, yaw=yaw, rate=rate or 0.0)
-            heading, how = degrees(yaw) % 360.0, float(direction)
-            return (_item(MavCmd.CONDITION_YAW, heading, degrees(rate or 0.0), how, 0.0),)
-        case _:
-            return _way(goal)
-
-
-def _way(goal: GoTo) -> tuple[Item, ...]:
-    _numbers(goal, wait=goal.wait, radius=goal.radius or 0.0, speed=goal.speed or 0.0)
-    wait = goal.wait if goal.passes else max(goal.wait, STOPPING)
-    yaw = 0.0
-    if goal.yaw is not None:
-        _numbers(goal, yaw=goal.yaw)
-        yaw = degrees(goal.yaw) % 360.0
-        yaw = NORTH if yaw < LEAST_YAW else yaw
-    if goal.place is None:
-        if goal.wait or goal.yaw is not None or goal.radius:
-            raise ValueError(
-                f"{goal}: a return home takes only a speed; add a Wait or Face after it"
-            )
-        way = _item(MavCmd.NAV_RETURN_TO_LAUNCH, 0.0, 0.0, 0.0, 0.0)
-    else:
-        frame, x, y = _at(goal.place)
-        radius = goal.radius or (0.0 if goal.passes else ON_THE_SPOT)
-        way = Item(frame, MavCmd.NAV_WAYPOINT, 0, 1, wait, radius, 0.0, yaw, x, y, 0.0)
-    if goal.speed is None:
-        return (way,)
-    return _speed(goal.speed), way, _speed(OWN_DEFAULT)
-
-
-def _at(place: Place) -> tuple[int, int, int]:
-    if isinstance(place, GlobalPlace):
-        return MavFrame.GLOBAL, place.latitude_degE7, place.longitude_degE7
-    _numbers(place, north=place.north, east=place.east)
-    x, y = round(place.north * LOCAL_SCALE), round(place.east * LOCAL_SCALE)
-    if max(abs(x), abs(y)) > LARGEST:
-        raise ValueError(f"{place}: too far away for a mission item")
-    return MavFrame.LOCAL_NED, x, y
-
-
-def _speed(speed: float) -> Item:
-    return _item(MavCmd.DO_CHANGE_SPEED, 1.0, speed, -1.0, 0.0)
-
-
-def _item(command: int, p1: float, p2: float, p3: float, p4: float) -> Item:
-    return Item(MavFrame.MISSION, command, 0, 1, p1, p2, p3, p4, 0, 0, 0.0)
-
-
-def _numbers(goal: Goal | LocalPlace, **values: float) -> None:
-    for name, value in values.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise ValueError(f"{goal}: {name} is not a number")
-        if name not in EXACT:
-            check_size(name, value)
-
-
-def check_size(name: str, value: float) -> None:
-    """Raise ValueError for a number that a float32 makes 0, which means "default", or infinite."""
-    if value and not LEAST <= abs(value) <= MOST:
-        raise ValueError(
-            f"{name} {value:g} is too {'small' if abs(value) < 1 else 'large'} to send"
-        )
+    own = float(terms.priority), terms.delay, terms.deadline, to_param(terms.after)
+    return Item(MavFrame.MISSION, MavCmd.TASK_OPTIONS, 0, 1, *own, nonce, check, 0.0)
 
 
 def _whole(name: str, value: int, low: int, high: int) -> None:

@@ -1,9 +1,12 @@
 """Drive and Head: keep a velocity for a time, with a yaw rate or on a heading."""
 
 from dataclasses import dataclass
+from math import degrees
 from typing import ClassVar
 
 from mav_tasks.kinds.form import DEGREE, DURATION, Form, any_number
+from mav_tasks.kinds.sent import Sent
+from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
 
 
@@ -23,6 +26,10 @@ class Drive:
     @property
     def named_speed(self) -> float:
         return abs(self.forward)
+
+    @property
+    def sent(self) -> tuple[Sent, ...]:
+        return (Sent(MavCmd.TASK_DRIVE, self.forward, degrees(self.yaw_rate), self.duration),)
 
 
 @dataclass(frozen=True, slots=True)

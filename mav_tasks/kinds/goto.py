@@ -1,13 +1,22 @@
 """GoTo: drive to a place, or home."""
 
 from dataclasses import dataclass
+from math import degrees
 from typing import Any
 
 from mav_tasks.kinds.form import DEGREE, HEADING, SPEED, Form, any_number, positive
+from mav_tasks.kinds.sent import LARGEST, Sent
+from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Number
 
 E7 = 1e7  # degE7 of a degree: MAVLink's integers
+LOCAL_SCALE = 1e4  # x and y in a local frame are in units of 0.1 mm
+ON_THE_SPOT = 0.01  # m, acceptance radius if none is given
+STOPPING = 0.01  # s, least hold time of a stop: a waypoint without hold is passed
+NORTH = 360.0  # deg, sent for north: 0 would mean "no heading"
+LEAST_YAW = 1e-4  # deg; a smaller yaw is sent as NORTH
+OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: the configured speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +26,14 @@ class LocalPlace:
     north: float
     east: float
 
+    @property
+    def sent(self) -> tuple[int, int, int]:
+        """Frame, x and y of an item. Raise ValueError if it is too far away."""
+        x, y = round(self.north * LOCAL_SCALE), round(self.east * LOCAL_SCALE)
+        if max(abs(x), abs(y)) > LARGEST:
+            raise ValueError(f"{self}: too far away for a mission item")
+        return MavFrame.LOCAL_NED, x, y
+
 
 @dataclass(frozen=True, slots=True)
 class GlobalPlace:
@@ -24,6 +41,11 @@ class GlobalPlace:
 
     latitude_degE7: int
     longitude_degE7: int
+
+    @property
+    def sent(self) -> tuple[int, int, int]:
+        """Frame, x and y of an item."""
+        return MavFrame.GLOBAL, self.latitude_degE7, self.longitude_degE7
 
 
 Place = LocalPlace | GlobalPlace
@@ -68,6 +90,34 @@ class GoTo:
     @property
     def named_speed(self) -> float:
         return self.speed or 0.0
+
+    @property
+    def sent(self) -> tuple[Sent, ...]:
+        """The items; a speed is set before the way, and the default after it."""
+        way = self._home if self.place is None else self._way(self.place)
+        if self.speed is None:
+            return (way,)
+        return _speed(self.speed), way, _speed(OWN_DEFAULT)
+
+    @property
+    def _home(self) -> Sent:
+        if self.wait or self.yaw is not None or self.radius:
+            words = "a return home takes only a speed; add a Wait or Face after it"
+            raise ValueError(f"{self}: {words}")
+        return Sent(MavCmd.NAV_RETURN_TO_LAUNCH)
+
+    def _way(self, place: Place) -> Sent:
+        wait = self.wait if self.passes else max(self.wait, STOPPING)
+        radius = self.radius or (0.0 if self.passes else ON_THE_SPOT)
+        yaw = 0.0
+        if self.yaw is not None:
+            yaw = degrees(self.yaw) % 360.0
+            yaw = NORTH if yaw < LEAST_YAW else yaw
+        return Sent(MavCmd.NAV_WAYPOINT, wait, radius, 0.0, yaw, *place.sent)
+
+
+def _speed(speed: float) -> Sent:
+    return Sent(MavCmd.DO_CHANGE_SPEED, 1.0, speed, -1.0)
 
 
 def _local(north: float, east: float, **others: Any) -> GoTo:

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from mav_tasks.kinds.form import SPEED, Form, any_number
+from mav_tasks.kinds.sent import Sent
+from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
 
 
@@ -25,6 +27,10 @@ class Move:
     @property
     def named_speed(self) -> float:
         return self.speed or 0.0
+
+    @property
+    def sent(self) -> tuple[Sent, ...]:
+        return (Sent(MavCmd.TASK_MOVE, self.distance, self.speed or 0.0),)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,8 @@ from math import degrees
 from typing import ClassVar
 
 from mav_tasks.kinds.form import DEGREE, HEADING, RATE, Form, any_number
+from mav_tasks.kinds.sent import Sent
+from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Number
 
@@ -25,6 +27,10 @@ class Rotate:
     def words(self) -> str:
         return f"rotate {degrees(self.angle):.6g} deg"
 
+    @property
+    def sent(self) -> tuple[Sent, ...]:
+        return (Sent(MavCmd.TASK_ROTATE, degrees(self.angle), degrees(self.rate or 0.0)),)
+
 
 @dataclass(frozen=True, slots=True)
 class Face:
@@ -43,6 +49,11 @@ class Face:
     @property
     def words(self) -> str:
         return f"face {degrees(self.yaw) % 360:.6g} deg"
+
+    @property
+    def sent(self) -> tuple[Sent, ...]:
+        heading, rate = degrees(self.yaw) % 360.0, degrees(self.rate or 0.0)
+        return (Sent(MavCmd.CONDITION_YAW, heading, rate, float(self.direction)),)
 
 
 def _face(heading: float, direction: int | None, rate: float | None) -> Face:

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from mav_tasks.kinds.form import DURATION, Form
+from mav_tasks.kinds.sent import Sent
+from mav_tasks.mavlink.enums import MavCmd
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,10 @@ class Wait:
         if self.until:
             return f"wait until {':'.join(f'{part:02}' for part in self.until)} UTC"
         return f"wait {self.duration:g} s"
+
+    @property
+    def sent(self) -> tuple[Sent, ...]:
+        return (Sent(MavCmd.NAV_DELAY, self.duration),)
 
 
 FORM = Form("wait", "Wait", "Stand still.", (DURATION,), Wait)
