@@ -23,7 +23,7 @@ link_reader: engine links
 setting_keys: errors
 settings: errors setting_keys
 mavlink: errors
-kinds: errors mavlink setting_keys
+kinds: errors mavlink setting_keys settings
 whole_file:
 folders: errors
 plan_files: errors mavlink whole_file

@@ -1,4 +1,4 @@
-"""The kinds of tasks: each file has what a kind is, its words, and its form in JSON.
+"""The kinds of tasks: each file has what a kind is, its words, its JSON, and how it is sent.
 
 SI units and radians; angles clockwise from north. Frozen values.
 """

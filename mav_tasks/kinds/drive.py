@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import degrees
 from typing import ClassVar
 
+from mav_tasks.kinds.base import Ability, Base, WhyNot
 from mav_tasks.kinds.form import DEGREE, DURATION, Form, any_number
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
@@ -11,7 +12,7 @@ from mav_tasks.setting_keys.parts import Part
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class Drive(Base):
     """Keep a velocity for a time: m/s forward, rad/s clockwise, ``duration`` in seconds."""
 
     rule: ClassVar[str] = "drive"
@@ -31,9 +32,18 @@ class Drive:
     def sent(self) -> tuple[Sent, ...]:
         return (Sent(MavCmd.TASK_DRIVE, self.forward, degrees(self.yaw_rate), self.duration),)
 
+    def why_not(self, ability: Ability) -> WhyNot | None:
+        if ability.is_steered and self.forward == 0.0 and self.yaw_rate:
+            return WhyNot(f"param2 yaw rate: {ability.why_no_turn}", 2)
+        if ability.honours_yaw_rate:
+            return None
+        if self.forward < 0:
+            return WhyNot(f"param1 forward speed {self.forward:g}: {ability.why_no_reverse}", 1)
+        return WhyNot(f"param2 yaw rate: {ability.why_no_rate}", 2) if self.yaw_rate else None
+
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class Head(Base):
     """Drive towards a heading for a time: ``yaw`` in radians, ``forward`` in m/s.
 
     ``is_relative``: the yaw counts from the heading at the start.
@@ -52,6 +62,13 @@ class Head:
     @property
     def named_speed(self) -> float:
         return abs(self.forward)
+
+    def why_not(self, ability: Ability) -> WhyNot | None:
+        if self.forward == 0.0 and not ability.may_spin:
+            return WhyNot(f"param2 speed 0: {ability.why_no_turn}", 2)
+        if self.forward < 0 and not ability.honours_yaw_rate:
+            return WhyNot(f"param2 speed {self.forward:g}: {ability.why_no_reverse}", 2)
+        return None
 
 
 FORM = Form(

@@ -1,9 +1,10 @@
 """GoTo: drive to a place, or home."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees
 from typing import Any
 
+from mav_tasks.kinds.base import Ability, Base
 from mav_tasks.kinds.form import DEGREE, HEADING, SPEED, Form, any_number, positive
 from mav_tasks.kinds.sent import LARGEST, Sent
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
@@ -52,7 +53,7 @@ Place = LocalPlace | GlobalPlace
 
 
 @dataclass(frozen=True, slots=True)
-class GoTo:
+class GoTo(Base):
     """Drive to a place in a straight line, facing forward.
 
     ``place`` None is the vehicle's home. ``speed`` in m/s, None = default. ``radius`` is the
@@ -90,6 +91,15 @@ class GoTo:
     @property
     def named_speed(self) -> float:
         return self.speed or 0.0
+
+    def as_driven(self, ability: Ability) -> tuple["GoTo", str]:
+        """Without the final heading where the autopilot ignores it, too: clients name one
+        without meaning it.
+        """
+        if self.yaw is None or ability.drives_everything:
+            return self, ""
+        words = f"{ability.rover} steers like a car: the final heading is ignored"
+        return replace(self, yaw=None), words if ability.is_steered else ""
 
     @property
     def sent(self) -> tuple[Sent, ...]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from mav_tasks.kinds.base import Ability, Base, WhyNot
 from mav_tasks.kinds.form import SPEED, Form, any_number
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
@@ -10,7 +11,7 @@ from mav_tasks.setting_keys.parts import Part
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class Move(Base):
     """Drive straight along the heading at the start.
 
     ``distance`` in metres, negative = backwards; ``speed`` in m/s, positive, None = default.
@@ -32,9 +33,23 @@ class Move:
     def sent(self) -> tuple[Sent, ...]:
         return (Sent(MavCmd.TASK_MOVE, self.distance, self.speed or 0.0),)
 
+    def why_not(self, ability: Ability) -> WhyNot | None:
+        if self._goes_on(ability) or ability.turns_on_spot:
+            return None
+        return WhyNot(f"param1 distance {self.distance:g}: {ability.why_no_reverse}", 1)
+
+    def as_driven(self, ability: Ability) -> tuple["Move | MoveTurned", str]:
+        if self._goes_on(ability):
+            return self, ""
+        words = f"{ability.why_no_reverse}: it turns round, drives, turns back"
+        return MoveTurned(-self.distance, self.speed), words
+
+    def _goes_on(self, ability: Ability) -> bool:
+        return self.distance >= 0 or ability.honours_yaw_rate
+
 
 @dataclass(frozen=True, slots=True)
-class MoveTurned:
+class MoveTurned(Base):
     """Move backwards with a vehicle that cannot reverse: turn round, drive, turn back.
 
     ``distance`` in metres, positive; ``speed`` as in Move.

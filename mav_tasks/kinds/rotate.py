@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import degrees
 from typing import ClassVar
 
+from mav_tasks.kinds.base import Ability, Base, WhyNot
 from mav_tasks.kinds.form import DEGREE, HEADING, RATE, Form, any_number
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
@@ -12,14 +13,13 @@ from mav_tasks.setting_keys.shapes import Number
 
 
 @dataclass(frozen=True, slots=True)
-class Rotate:
+class Rotate(Base):
     """Turn on the spot: ``angle`` in radians, clockwise positive, may exceed a full turn.
 
     ``rate`` in rad/s, positive, None = default.
     """
 
     rule: ClassVar[str] = "rotate"
-    named_speed: ClassVar[float] = 0.0
     angle: float
     rate: float | None = None
 
@@ -31,9 +31,12 @@ class Rotate:
     def sent(self) -> tuple[Sent, ...]:
         return (Sent(MavCmd.TASK_ROTATE, degrees(self.angle), degrees(self.rate or 0.0)),)
 
+    def why_not(self, ability: Ability) -> WhyNot | None:
+        return None if ability.may_spin else WhyNot(ability.why_no_turn)
+
 
 @dataclass(frozen=True, slots=True)
-class Face:
+class Face(Base):
     """Turn on the spot to a heading.
 
     ``yaw`` in radians from north; ``direction`` 1 clockwise, -1 counter-clockwise, 0 the shorter
@@ -41,7 +44,6 @@ class Face:
     """
 
     rule: ClassVar[str] = "rotate"
-    named_speed: ClassVar[float] = 0.0
     yaw: float
     direction: int = 0
     rate: float | None = None
@@ -54,6 +56,9 @@ class Face:
     def sent(self) -> tuple[Sent, ...]:
         heading, rate = degrees(self.yaw) % 360.0, degrees(self.rate or 0.0)
         return (Sent(MavCmd.CONDITION_YAW, heading, rate, float(self.direction)),)
+
+    def why_not(self, ability: Ability) -> WhyNot | None:
+        return None if ability.may_spin else WhyNot(ability.why_no_turn)
 
 
 def _face(heading: float, direction: int | None, rate: float | None) -> Face:

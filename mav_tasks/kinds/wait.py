@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from mav_tasks.kinds.base import Base
 from mav_tasks.kinds.form import DURATION, Form
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 
 
 @dataclass(frozen=True, slots=True)
-class Wait:
+class Wait(Base):
     """Stand for ``duration`` seconds.
 
     With ``until`` it stands until that time of day (UTC), and ``duration`` is when it comes again:
@@ -17,7 +18,6 @@ class Wait:
     """
 
     rule: ClassVar[str] = "wait"
-    named_speed: ClassVar[float] = 0.0
     duration: float
     until: tuple[int, ...] = ()
 

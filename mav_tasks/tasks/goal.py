@@ -3,17 +3,18 @@
 from dataclasses import dataclass
 
 from mav_tasks.kinds import GoTo, SingleGoal
+from mav_tasks.kinds.base import Ability, Base, WhyNot
 
 FEW_STEPS = 4  # most steps of a plan that may be told as a single goal
 
 
 @dataclass(frozen=True, slots=True)
-class Nothing:
+class Nothing(Base):
     """A step that does nothing: home, a take-off, or options of the whole plan."""
 
 
 @dataclass(frozen=True, slots=True)
-class SetSpeed:
+class SetSpeed(Base):
     """Drive at ``speed`` m/s from here on; None: as without a plan."""
 
     speed: float | None
@@ -24,7 +25,7 @@ class SetSpeed:
 
 
 @dataclass(frozen=True, slots=True)
-class Jump:
+class Jump(Base):
     """Continue at the step ``to``, ``times`` times (-1: for ever); after that do nothing."""
 
     to: int
@@ -32,14 +33,19 @@ class Jump:
 
 
 @dataclass(frozen=True, slots=True)
-class SetReverse:
+class SetReverse(Base):
     """Drive to the places from here on backwards, or forwards again."""
 
     backwards: bool
 
+    def why_not(self, ability: Ability) -> WhyNot | None:
+        if self.backwards and not ability.honours_yaw_rate:
+            return WhyNot(f"{ability.why_no_reverse}: leave DO_SET_REVERSE out", 1)
+        return None
+
 
 @dataclass(frozen=True, slots=True)
-class Perform:
+class Perform(Base):
     """A command to the vehicle itself; only the plan's ``source`` says which one.
 
     ``role``: the least that may send it.
@@ -49,14 +55,14 @@ class Perform:
 
 
 @dataclass(frozen=True, slots=True)
-class Delay:
+class Delay(Base):
     """CONDITION_DELAY: the steps up to the next place wait ``seconds``; the vehicle drives on."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
-class Near:
+class Near(Base):
     """CONDITION_DISTANCE: the steps up to the next place wait until it is ``distance`` m away."""
 
     distance: float

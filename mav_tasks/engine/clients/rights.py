@@ -115,8 +115,7 @@ class Rights(NamedTuple):
                     self.require(role, words, moves=True)
         top = limits.max_speed
         if top < NO_LIMIT.max_speed:
-            named = (getattr(step, "named_speed", 0.0) for step in steps_of(goal))
-            fastest = max(named, default=0.0)
+            fastest = max((step.named_speed for step in steps_of(goal)), default=0.0)
             if fastest > top * SAME:
                 raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
 

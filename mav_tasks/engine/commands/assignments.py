@@ -10,7 +10,7 @@ from collections.abc import Callable, Container, Iterable, Sequence
 from math import inf, isnan, nan
 from typing import NamedTuple
 
-from mav_tasks.engine.commands.ability import Ability, as_driven, check_reach
+from mav_tasks.engine.commands.ability import ability_of, adapted, check_reach
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.joint_control import client_driving
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -316,16 +316,16 @@ def check_any(goal: Goal, *, name: str = "") -> None:
 
 def driven_by(vehicle: Vehicle, goal: Goal) -> Goal:
     """Return a goal as a vehicle drives it. Raise Rejection if it cannot, or must not go there."""
-    ability = Ability.of(vehicle.persona, rover="it")
+    ability = ability_of(vehicle.persona, rover="it")
     steps = [each for each in steps_of(goal) if isinstance(each, GoTo)]
     for step in steps:
         check_reach(vehicle, step)
     if not isinstance(goal, Plan):
-        return as_driven(goal, ability)
+        return adapted(goal, ability)[0]
     if vehicle.where.leg_over_fence(goal.steps) is not None:
         raise Rejection(R.OUTSIDE_FENCE, "the path crosses the fence")
-    driven = (as_driven(step, ability) for step in goal.steps)
-    return Plan(tuple(driven), goal.source, goal.first, goal.has_home, goal.has_options)
+    steps_driven = tuple(adapted(step, ability)[0] for step in goal.steps)
+    return Plan(steps_driven, goal.source, goal.first, goal.has_home, goal.has_options)
 
 
 def _driven_alike(vehicle: Vehicle, goal: Goal) -> Goal:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from math import hypot, isnan
 from typing import Any, NamedTuple
 
-from mav_tasks.engine.commands.ability import as_driven
+from mav_tasks.engine.commands.ability import adapted
 from mav_tasks.engine.commands.goals import (
     GLOBAL_FRAMES,
     KNOWN_FRAMES,
@@ -167,7 +167,7 @@ def step_of(item: Item, seq: int, *, count: int, manner: MissionParseOptions) ->
         if item.frame not in KNOWN_FRAMES:
             raise Rejection(R.BAD_FRAME, f"frame {item.frame} is unknown")
         refuse_infinite(command)
-        return as_driven(step_of_command(command, count, manner), manner.ability)
+        return adapted(step_of_command(command, count, manner), manner.ability)[0]
     except Rejection as why:
         name = number_of(seq, has_home=manner.has_home)
         raise Rejection(why.reason, f"item {name}: {why.text}", param=why.param) from None

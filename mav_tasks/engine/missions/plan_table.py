@@ -11,7 +11,7 @@ from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
-from mav_tasks.engine.commands.ability import Ability
+from mav_tasks.engine.commands.ability import ability_of
 from mav_tasks.engine.commands.goals import (
     MAX_DELAY,
     MAX_WAIT,
@@ -26,6 +26,7 @@ from mav_tasks.engine.commands.goals import (
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.errors import Rejection
 from mav_tasks.kinds import GoTo, Place, Wait
+from mav_tasks.kinds.base import Ability
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
 from mav_tasks.services.commands import Command
 from mav_tasks.services.missions import NOT_GIVEN
@@ -64,7 +65,7 @@ class MissionParseOptions(NamedTuple):
         if persona is None:
             return cls(has_home=False, ability=Ability(), driving=driving)
         is_px4 = persona.autopilot == MavAutopilot.PX4
-        return cls(persona.has_home_item and is_staged, Ability.of(persona), driving, is_px4)
+        return cls(persona.has_home_item and is_staged, ability_of(persona), driving, is_px4)
 
 
 class PlanRow(NamedTuple):
