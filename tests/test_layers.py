@@ -55,7 +55,7 @@ qgc_actions: errors mavlink whole_file
 web: client crowd engine errors folders histogram http_connections key_ring kinds latest logs
     mavlink
     metrics plan_files recording services setting_keys settings store tasks
-probe: engine errors mavlink services settings tasks
+probe: engine errors kinds mavlink services settings tasks
 probing: client errors links mavlink probe
 cli: agents client config errors folders key_ring kinds link_keys links logs mavlink mcap_export
     plan_files probe probing qgc_actions recording serve setting_keys settings store tasks web

@@ -4,8 +4,9 @@ SI units and radians; angles clockwise from north. Frozen values.
 """
 
 from mav_tasks.kinds.drive import Drive, Head
-from mav_tasks.kinds.goto import GlobalPlace, GoTo, LocalPlace, Place
+from mav_tasks.kinds.goto import GoTo
 from mav_tasks.kinds.move import Move, MoveTurned
+from mav_tasks.kinds.places import Bend, GlobalPlace, LocalPlace, Place, Pose
 from mav_tasks.kinds.rotate import Face, Rotate
 from mav_tasks.kinds.wait import Wait
 
@@ -13,6 +14,7 @@ from mav_tasks.kinds.wait import Wait
 SingleGoal = Move | MoveTurned | Rotate | Drive | GoTo | Face | Head | Wait
 
 __all__ = [
+    "Bend",
     "Drive",
     "Face",
     "GlobalPlace",
@@ -22,6 +24,7 @@ __all__ = [
     "Move",
     "MoveTurned",
     "Place",
+    "Pose",
     "Rotate",
     "SingleGoal",
     "Wait",

@@ -1,8 +1,13 @@
 """What the server asks of a goal, or a step of a plan; a kind answers what is special about it."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
+from mav_tasks.kinds.places import Bend, LocalPlace, Pose
 from mav_tasks.settings import Turning
+
+#: the legs of a way to a place: face it (as a car: drive to where the last run to it begins),
+#: drive there; others may follow
+FACE, WAY = range(2)
 
 
 class Ability(NamedTuple):
@@ -60,6 +65,28 @@ class WhyNot(NamedTuple):
     param: int = 0
 
 
+class Begun(Protocol):
+    """How far a task has got, as far as a leg follows from it: see ``Progress``."""
+
+    @property
+    def anchor(self) -> Pose | None: ...
+
+    @property
+    def leg(self) -> int: ...
+
+    @property
+    def target(self) -> LocalPlace | None: ...
+
+    @property
+    def path(self) -> tuple[Bend, ...]: ...
+
+
+def anchor_in(progress: Begun) -> Pose:
+    """Return the pose where the present leg has begun."""
+    assert progress.anchor is not None, "a leg is driven from its anchor"
+    return progress.anchor
+
+
 class Base:
     """The usual answers."""
 
@@ -77,3 +104,41 @@ class Base:
     def as_driven(self, ability: Ability) -> tuple[Any, str]:  # noqa: ARG002
         """It as a vehicle of this ability drives it, and a text if that differs, or ""."""
         return self, ""
+
+    # its legs, each counted from its own anchor. They depend only on the goal, on the pose where
+    # each one began and on the place meant, so that a resumed task drives the very same ones.
+
+    @property
+    def leg_count(self) -> int:
+        """The number of its legs."""
+        return 1
+
+    def anchor_of(self, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:  # noqa: ARG002
+        """The anchor of a leg that begins at ``pose``."""
+        return pose
+
+    def leg_of(self, progress: Begun) -> Any:  # noqa: ARG002
+        """The leg that is being driven: a goal that ``guidance`` can steer."""
+        return self
+
+    def begun_from(self, pose: Pose, done: float) -> Pose:  # noqa: ARG002
+        """The anchor if a vehicle that stands at ``pose`` has already driven ``done``.
+
+        It is for a task that resumes from here because its own anchor is lost.
+        """
+        return pose
+
+    def done_so_far(
+        self,
+        anchor: Pose,  # noqa: ARG002
+        pose: Pose,  # noqa: ARG002
+        *,
+        before: float,
+        elapsed: float = 0.0,
+    ) -> float:
+        """Of a leg: the metres along it, the radians turned, or the seconds, since the anchor.
+
+        ``before`` is the last such value, and ``elapsed`` the time since. The result is negative if
+        the vehicle is behind its anchor.
+        """
+        return before + elapsed

@@ -1,11 +1,12 @@
 """Drive and Head: keep a velocity for a time, with a yaw rate or on a heading."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees
 from typing import ClassVar
 
-from mav_tasks.kinds.base import Ability, Base, WhyNot
+from mav_tasks.kinds.base import Ability, Base, Begun, WhyNot, anchor_in
 from mav_tasks.kinds.form import DEGREE, DURATION, Form, any_number
+from mav_tasks.kinds.path import wrap
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
@@ -41,6 +42,11 @@ class Drive(Base):
             return WhyNot(f"param1 forward speed {self.forward:g}: {ability.why_no_reverse}", 1)
         return WhyNot(f"param2 yaw rate: {ability.why_no_rate}", 2) if self.yaw_rate else None
 
+    @property
+    def length(self) -> float:
+        """How long it lasts, s."""
+        return self.duration
+
 
 @dataclass(frozen=True, slots=True)
 class Head(Base):
@@ -69,6 +75,16 @@ class Head(Base):
         if self.forward < 0 and not ability.honours_yaw_rate:
             return WhyNot(f"param2 speed {self.forward:g}: {ability.why_no_reverse}", 2)
         return None
+
+    @property
+    def length(self) -> float:
+        """How long it lasts, s."""
+        return self.duration
+
+    def leg_of(self, progress: Begun) -> "Head":
+        if not self.is_relative:
+            return self
+        return replace(self, yaw=wrap(anchor_in(progress).yaw + self.yaw), is_relative=False)
 
 
 FORM = Form(

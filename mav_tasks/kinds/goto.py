@@ -1,55 +1,27 @@
 """GoTo: drive to a place, or home."""
 
 from dataclasses import dataclass, replace
-from math import degrees
+from math import degrees, pi, tau
 from typing import Any
 
-from mav_tasks.kinds.base import Ability, Base
+from mav_tasks.kinds.base import FACE, WAY, Ability, Base, Begun, anchor_in
 from mav_tasks.kinds.form import DEGREE, HEADING, SPEED, Form, any_number, positive
-from mav_tasks.kinds.sent import LARGEST, Sent
-from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.kinds.move import Move
+from mav_tasks.kinds.path import Follow, bearing, distance, wrap
+from mav_tasks.kinds.places import GlobalPlace, LocalPlace, Place, Pose
+from mav_tasks.kinds.rotate import Rotate, turn_to
+from mav_tasks.kinds.sent import Sent
+from mav_tasks.kinds.wait import Wait
+from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Number
 
 E7 = 1e7  # degE7 of a degree: MAVLink's integers
-LOCAL_SCALE = 1e4  # x and y in a local frame are in units of 0.1 mm
 ON_THE_SPOT = 0.01  # m, acceptance radius if none is given
 STOPPING = 0.01  # s, least hold time of a stop: a waypoint without hold is passed
 NORTH = 360.0  # deg, sent for north: 0 would mean "no heading"
 LEAST_YAW = 1e-4  # deg; a smaller yaw is sent as NORTH
 OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: the configured speed
-
-
-@dataclass(frozen=True, slots=True)
-class LocalPlace:
-    """A place in the vehicle's own local frame, metres north and east of its origin."""
-
-    north: float
-    east: float
-
-    @property
-    def sent(self) -> tuple[int, int, int]:
-        """Frame, x and y of an item. Raise ValueError if it is too far away."""
-        x, y = round(self.north * LOCAL_SCALE), round(self.east * LOCAL_SCALE)
-        if max(abs(x), abs(y)) > LARGEST:
-            raise ValueError(f"{self}: too far away for a mission item")
-        return MavFrame.LOCAL_NED, x, y
-
-
-@dataclass(frozen=True, slots=True)
-class GlobalPlace:
-    """A place on earth, exactly as MAVLink's integers give it."""
-
-    latitude_degE7: int
-    longitude_degE7: int
-
-    @property
-    def sent(self) -> tuple[int, int, int]:
-        """Frame, x and y of an item."""
-        return MavFrame.GLOBAL, self.latitude_degE7, self.longitude_degE7
-
-
-Place = LocalPlace | GlobalPlace
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +72,36 @@ class GoTo(Base):
             return self, ""
         words = f"{ability.rover} steers like a car: the final heading is ignored"
         return replace(self, yaw=None), words if ability.is_steered else ""
+
+    @property
+    def leg_count(self) -> int:
+        return 2 + (self.yaw is not None) + (self.wait > 0)
+
+    def heading_to(self, pose: Pose, target: LocalPlace) -> float:
+        """Return the heading of the vehicle when it drives straight to a place."""
+        return bearing(pose, target) + pi * self.backwards
+
+    def anchor_of(self, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
+        if leg != WAY:
+            return pose
+        assert target is not None, "the place was found before the task began"
+        return replace(pose, yaw=self.heading_to(pose, target))
+
+    def leg_of(self, progress: Begun) -> Move | Rotate | Follow | Wait:
+        anchor, target = anchor_in(progress), progress.target
+        if progress.leg > WAY:
+            if progress.leg == WAY + 1 and self.yaw is not None:
+                return Rotate(turn_to(anchor.yaw, self.yaw, 0))
+            return Wait(self.wait)
+        assert target is not None, "the place was found before the task began"
+        if progress.path:
+            return Follow(progress.path, self.speed)
+        if progress.leg == FACE:
+            return Rotate(wrap(self.heading_to(anchor, target) - anchor.yaw))
+        way = distance(anchor, target)
+        if self.turns:  # only to estimate it: the way onto it is planned when it begins
+            return Move(way + tau * self.turns * abs(self.around), self.speed)
+        return Move(-way if self.backwards else way, self.speed)
 
     @property
     def sent(self) -> tuple[Sent, ...]:

@@ -1,10 +1,14 @@
 """Move: drive straight along the heading at the start."""
 
 from dataclasses import dataclass
+from math import copysign, pi
 from typing import ClassVar
 
-from mav_tasks.kinds.base import Ability, Base, WhyNot
+from mav_tasks.kinds.base import WAY, Ability, Base, Begun, WhyNot
 from mav_tasks.kinds.form import SPEED, Form, any_number
+from mav_tasks.kinds.path import forward_of, moved
+from mav_tasks.kinds.places import Pose
+from mav_tasks.kinds.rotate import Rotate
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
@@ -44,6 +48,24 @@ class Move(Base):
         words = f"{ability.why_no_reverse}: it turns round, drives, turns back"
         return MoveTurned(-self.distance, self.speed), words
 
+    @property
+    def length(self) -> float:
+        """Its whole length, m."""
+        return abs(self.distance)
+
+    def begun_from(self, pose: Pose, done: float) -> Pose:
+        return moved(pose, 0.0, -copysign(done, self.distance))
+
+    def done_so_far(
+        self,
+        anchor: Pose,
+        pose: Pose,
+        *,
+        before: float,  # noqa: ARG002
+        elapsed: float = 0.0,  # noqa: ARG002
+    ) -> float:
+        return copysign(1.0, self.distance) * forward_of(anchor, pose)
+
     def _goes_on(self, ability: Ability) -> bool:
         return self.distance >= 0 or ability.honours_yaw_rate
 
@@ -66,6 +88,13 @@ class MoveTurned(Base):
     @property
     def named_speed(self) -> float:
         return self.speed or 0.0
+
+    @property
+    def leg_count(self) -> int:
+        return 3
+
+    def leg_of(self, progress: Begun) -> Move | Rotate:
+        return Move(self.distance, self.speed) if progress.leg == WAY else Rotate(pi)
 
 
 FORM = Form(

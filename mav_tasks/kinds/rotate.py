@@ -1,11 +1,13 @@
 """Rotate and Face: turn on the spot, by an angle or to a heading."""
 
-from dataclasses import dataclass
-from math import degrees
+from dataclasses import dataclass, replace
+from math import copysign, degrees, pi, tau
 from typing import ClassVar
 
-from mav_tasks.kinds.base import Ability, Base, WhyNot
+from mav_tasks.kinds.base import Ability, Base, Begun, WhyNot, anchor_in
 from mav_tasks.kinds.form import DEGREE, HEADING, RATE, Form, any_number
+from mav_tasks.kinds.path import wrap
+from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
@@ -34,6 +36,28 @@ class Rotate(Base):
     def why_not(self, ability: Ability) -> WhyNot | None:
         return None if ability.may_spin else WhyNot(ability.why_no_turn)
 
+    @property
+    def length(self) -> float:
+        """Its whole angle, rad."""
+        return abs(self.angle)
+
+    def begun_from(self, pose: Pose, done: float) -> Pose:
+        return replace(pose, yaw=wrap(pose.yaw - copysign(done, self.angle)))
+
+    def done_so_far(
+        self,
+        anchor: Pose,
+        pose: Pose,
+        *,
+        before: float,
+        elapsed: float = 0.0,  # noqa: ARG002
+    ) -> float:
+        """The radians turned. Full turns count: it is the value nearest to ``before`` that fits
+        the measured heading, if the vehicle is seen at least twice in half a turn.
+        """
+        turned = copysign(1.0, self.angle) * (pose.yaw - anchor.yaw)
+        return before + wrap(turned - before)
+
 
 @dataclass(frozen=True, slots=True)
 class Face(Base):
@@ -59,6 +83,17 @@ class Face(Base):
 
     def why_not(self, ability: Ability) -> WhyNot | None:
         return None if ability.may_spin else WhyNot(ability.why_no_turn)
+
+    def leg_of(self, progress: Begun) -> Rotate:
+        return Rotate(turn_to(anchor_in(progress).yaw, self.yaw, self.direction), self.rate)
+
+
+def turn_to(have: float, want: float, direction: int) -> float:
+    """Return the angle between two headings, in ``direction``, or the shorter way if that is 0."""
+    short = wrap(want - have)
+    if direction == 0 or short * direction >= 0 or abs(abs(short) - pi) < 1e-9:
+        return copysign(short, direction) if direction else short
+    return short + direction * tau
 
 
 def _face(heading: float, direction: int | None, rate: float | None) -> Face:

@@ -31,5 +31,10 @@ class Wait(Base):
     def sent(self) -> tuple[Sent, ...]:
         return (Sent(MavCmd.NAV_DELAY, self.duration),)
 
+    @property
+    def length(self) -> float:
+        """How long it lasts, s."""
+        return self.duration
+
 
 FORM = Form("wait", "Wait", "Stand still.", (DURATION,), Wait)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NewType
 
-from mav_tasks.kinds import GoTo, LocalPlace
+from mav_tasks.kinds import Bend, GoTo, LocalPlace, Pose
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.timing import Timing
@@ -28,26 +28,6 @@ MAX_PRIORITY = 10  # 10 runs first
 SAME_ORIGIN = 10
 CLOCK_ERROR = 0.12  # of the elapsed time: simulators run at 0.9 or less, a real clock at 0.9999
 SAME_BOOT = 5.0  # s; two estimates of the boot time this close may be of the same boot
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """A vehicle's pose in its local frame: metres north and east, yaw in radians."""
-
-    north: float
-    east: float
-    yaw: float
-
-
-@dataclass(frozen=True, slots=True)
-class Bend:
-    """A piece of a path: ``length`` m of arc or straight line, negative if driven backwards.
-
-    ``curvature`` in 1/m, positive where driving forwards turns clockwise, 0 = straight.
-    """
-
-    curvature: float
-    length: float
 
 
 @dataclass(frozen=True, slots=True)

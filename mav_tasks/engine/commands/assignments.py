@@ -16,18 +16,18 @@ from mav_tasks.engine.vehicles.joint_control import client_driving
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
-from mav_tasks.kinds import GoTo, LocalPlace, SingleGoal
+from mav_tasks.kinds import GoTo, LocalPlace, Pose, SingleGoal
+from mav_tasks.kinds.path import distance
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.driving.estimate import Estimate
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
-from mav_tasks.tasks.driving.path import distance
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.goal import Goal, Plan, steps_of
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
+from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 

@@ -6,6 +6,7 @@
 from math import isfinite, nan
 
 from mav_tasks.kinds import Face, GoTo, Move, MoveTurned, Rotate
+from mav_tasks.kinds.path import Follow
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -13,9 +14,7 @@ from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.commands import Command
 from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.driving.estimate import time_left
-from mav_tasks.tasks.driving.legs import leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
-from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.events import (
     SERVER,
     Event,
@@ -307,7 +306,7 @@ def _left(task: Task, tasks: VehicleTasks) -> tuple[int, float]:
             return UNIT_METRES, way if way < FLOAT32_MAX else nan
     goal = present_goal(task.goal, task.progress)
     if task.progress.anchor is not None:
-        leg = leg_of(goal, task.progress)
+        leg = goal.leg_of(task.progress)
     elif isinstance(goal, GoTo | MoveTurned | Face):
         return UNIT_NONE, nan  # the size of its first leg is not known before it starts
     else:
@@ -317,7 +316,7 @@ def _left(task: Task, tasks: VehicleTasks) -> tuple[int, float]:
         unit = UNIT_METRES
     elif isinstance(leg, Rotate):
         unit = UNIT_RADIANS
-    return unit, max(0.0, length_of(leg) - task.progress.done)
+    return unit, max(0.0, leg.length - task.progress.done)
 
 
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
@@ -326,7 +325,7 @@ def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
         count = goal.item_count
         step = goal.item_number(max(progress.step, goal.first)) - 1
         return min(max(step, 0), max(count - 1, 0)), count
-    return progress.leg, leg_count(goal)
+    return progress.leg, goal.leg_count
 
 
 def _words(task: Task, reason: TaskReason, says: str) -> str:

@@ -8,17 +8,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, copysign, isfinite, sqrt
 
-from mav_tasks.kinds import Drive, GlobalPlace, GoTo, Head, Move, MoveTurned, SingleGoal
+from mav_tasks.kinds import Drive, GlobalPlace, GoTo, Head, Move, MoveTurned, Pose, SingleGoal
+from mav_tasks.kinds.base import WAY
+from mav_tasks.kinds.path import Spot, distance, moved, pose_on, rest_of, wrap
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Fence, LocalFence
 from mav_tasks.tasks.driving.frames import local_place, to_local
-from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, clamped, wrap
-from mav_tasks.tasks.driving.legs import WAY
+from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, clamped
 from mav_tasks.tasks.driving.mission_sequencer import ways_on
-from mav_tasks.tasks.driving.path import Spot, distance, moved, pose_on, rest_of
 from mav_tasks.tasks.driving.planner import is_allowed
 from mav_tasks.tasks.goal import Step
-from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.task import Progress
 
 MARGIN = 0.05  # m left between a vehicle and its fence
 LATENCY = 0.3  # s until a vehicle does what it is told, including the age of its telemetry

@@ -8,15 +8,14 @@ from dataclasses import replace
 from math import nan, sqrt
 from typing import NamedTuple
 
-from mav_tasks.kinds import Drive, Face, GlobalPlace, GoTo, Head, Move, Rotate, SingleGoal
+from mav_tasks.kinds import Drive, Face, GlobalPlace, GoTo, Head, Move, Pose, Rotate, SingleGoal
+from mav_tasks.kinds.base import WAY
+from mav_tasks.kinds.path import Follow, moved, wrap
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.frames import local_place
-from mav_tasks.tasks.driving.guidance import wrap
-from mav_tasks.tasks.driving.legs import WAY, anchor_of, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import begun, following, is_over, present_goal
-from mav_tasks.tasks.driving.path import Follow, moved
 from mav_tasks.tasks.goal import Goal, Plan, SetSpeed
-from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.task import Progress
 
 SETTLING = 1.5  # s from one task's end to motion, and from near its end to a measured standstill
 MOST_STEPS = 300  # of a plan; a longer one has no estimate
@@ -78,14 +77,14 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
     if is_unknown and progress.anchor is None and isinstance(goal, GoTo | Face):
         return UNKNOWN
     at, seconds, metres, driving = pose or SOMEWHERE, SETTLING, 0.0, known.driving
-    for number in range(progress.leg, leg_count(goal)):
+    for number in range(progress.leg, goal.leg_count):
         if number == progress.leg and progress.anchor is not None:
             present, at = progress, progress.anchor
         else:
-            at = anchor_of(goal, number, at, target)
+            at = goal.anchor_of(number, at, target)
             present = Progress(anchor=at, leg=number, target=target)
-        leg = leg_of(goal, present)
-        left = max(0.0, length_of(leg) - present.done)
+        leg = goal.leg_of(present)
+        left = max(0.0, leg.length - present.done)
         took, way = left, 0.0
         match leg:
             case Move(speed=own) | Follow(speed=own):

@@ -7,6 +7,7 @@ velocity waits until EXECUTING is durable; zeros never wait.
 from dataclasses import dataclass, replace
 
 from mav_tasks.histogram import Histogram
+from mav_tasks.kinds import Pose
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.bounds import Bounds
@@ -16,7 +17,7 @@ from mav_tasks.tasks.driving.stage import is_off_line, was_handled
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
+from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.times import Times
 from mav_tasks.tasks.timing import INTERVALS, Timing, TimingMeter
 from mav_tasks.tasks.view import Demand, ModeKind, VehicleView, start_blocker

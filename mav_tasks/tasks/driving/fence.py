@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import hypot, inf, sqrt
 
-from mav_tasks.kinds import GlobalPlace
+from mav_tasks.kinds import GlobalPlace, Pose
+from mav_tasks.kinds.path import Spot, moved, point_of
 from mav_tasks.tasks.driving.frames import to_local
-from mav_tasks.tasks.driving.path import Spot, moved, point_of
-from mav_tasks.tasks.task import Pose
 
 EDGE = 0.001  # m to either side of a boundary that count as boundary
 MIN_CORNERS = 3

@@ -5,22 +5,20 @@ a pre-emption leaves no error behind. ``limits`` bounds the velocity before it i
 """
 
 from dataclasses import dataclass
-from math import atan, atan2, copysign, cos, hypot, inf, pi, radians, sin, sqrt, tan
+from math import atan, atan2, copysign, hypot, inf, pi, radians, sqrt, tan
 from typing import NamedTuple
 
-from mav_tasks.kinds import Drive, Head, Move, Rotate, Wait
-from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.path import (
+from mav_tasks.kinds import Drive, Head, Move, Pose, Rotate, Wait
+from mav_tasks.kinds.path import (
     Follow,
     cross_track,
     curvature_at,
     direction_of,
-    forward_of,
-    nearest,
     path_length,
     pose_on,
+    wrap,
 )
-from mav_tasks.tasks.task import Pose
+from mav_tasks.settings import Driving
 
 #: the goals that can be steered; ``legs`` splits every goal into these
 Leg = Move | Rotate | Drive | Head | Wait | Follow
@@ -115,36 +113,9 @@ class Slowest(NamedTuple):
 USUAL = Slowest()
 
 
-def wrap(angle: float) -> float:
-    """Return an angle wrapped to ±pi."""
-    return atan2(sin(angle), cos(angle))
-
-
 def clamped(value: float, most: float) -> float:
     """Return the value that is nearest to this one and within ±``most``."""
     return max(-most, min(most, value))
-
-
-def done_so_far(
-    leg: Leg, anchor: Pose, pose: Pose, *, before: float, elapsed: float = 0.0
-) -> float:
-    """Return the metres along the line, the radians turned, or the seconds, since the anchor.
-
-    ``before`` is the last such value, and ``elapsed`` the time since. A rotation counts full turns:
-    the result is the one nearest to ``before`` that fits the measured heading. This holds if the
-    vehicle is seen at least twice in half a turn. The result is negative if the vehicle is behind
-    its anchor.
-    """
-    match leg:
-        case Move(distance=distance):
-            return copysign(1.0, distance) * forward_of(anchor, pose)
-        case Rotate(angle=angle):
-            turned = copysign(1.0, angle) * (pose.yaw - anchor.yaw)
-            return before + wrap(turned - before)
-        case Follow(path=path):
-            return nearest(anchor, path, pose, around=before)
-        case Drive() | Head() | Wait():
-            return before + elapsed
 
 
 def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) -> bool:

@@ -3,14 +3,15 @@
 from dataclasses import dataclass, replace
 from math import copysign
 
-from mav_tasks.kinds import GoTo, Head, SingleGoal
+from mav_tasks.kinds import GoTo, Head, Pose, SingleGoal
+from mav_tasks.kinds.base import FACE, WAY
+from mav_tasks.kinds.path import Follow, distance
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving import guidance
 from mav_tasks.tasks.driving.guidance import USUAL, Leg, Line, Motion, Slowest, Velocity
-from mav_tasks.tasks.driving.legs import FACE, WAY, begun_leg, leg_count, leg_of, length_of
-from mav_tasks.tasks.driving.path import Follow, distance
+from mav_tasks.tasks.driving.legs import begun_leg
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
-from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.task import Progress
 
 BESIDE = 0.15  # m from a place, at the end of the way there; farther off has missed it
 #: m, the same for a car that cannot reverse: to come nearer it would drive a full circle
@@ -49,13 +50,13 @@ class PathFollower:
         progress = self.progress
         of = progress.leg, progress.anchor, progress.target, progress.path
         if self._leg is None or of != self._leg_of:
-            self._leg, self._leg_of = leg_of(self.goal, progress), of
+            self._leg, self._leg_of = self.goal.leg_of(progress), of
         return self._leg
 
     @property
     def remaining(self) -> float:
         """Rest of the current leg in m, rad or s; negative beyond its end."""
-        return length_of(self.leg) - self.progress.done
+        return self.leg.length - self.progress.done
 
     @property
     def has_one_try(self) -> bool:
@@ -97,9 +98,7 @@ class PathFollower:
     def look(self, motion: Motion, *, elapsed: float) -> None:
         """Update the progress from the motion, ``elapsed`` seconds after the last look."""
         before = self.progress.done
-        done = guidance.done_so_far(
-            self.leg, self.anchor, motion.pose, before=before, elapsed=elapsed
-        )
+        done = self.leg.done_so_far(self.anchor, motion.pose, before=before, elapsed=elapsed)
         self.progress = replace(self.progress, done=done)
         if self.is_passing and self.remaining <= 0.0 and not self.has_passed(motion):
             self.passing = 0.0  # missed: it stops, and tries again from there
@@ -153,7 +152,7 @@ class PathFollower:
         if has_missed:
             following = WAY if self.by_course else FACE
             self.misses += 1
-        if following >= leg_count(goal):
+        if following >= goal.leg_count:
             return False
         self.progress = begun_leg(goal, self.progress, following, motion.pose)
         return True

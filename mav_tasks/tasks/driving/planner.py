@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import atan2, copysign, pi, remainder, sqrt, tau
 
-from mav_tasks.kinds import GoTo, LocalPlace
-from mav_tasks.tasks.driving.fence import LocalFence
-from mav_tasks.tasks.driving.legs import FACE, WAY
-from mav_tasks.tasks.driving.path import (
+from mav_tasks.kinds import Bend, GoTo, LocalPlace, Pose
+from mav_tasks.kinds.base import FACE, WAY
+from mav_tasks.kinds.path import (
     STRAIGHT,
     Path,
     bearing,
@@ -28,7 +27,8 @@ from mav_tasks.tasks.driving.path import (
     runs_of,
     turn_of,
 )
-from mav_tasks.tasks.task import Bend, Pose, Progress
+from mav_tasks.tasks.driving.fence import LocalFence
+from mav_tasks.tasks.task import Progress
 
 #: factor on the turning radius: a planned bend leaves room to steer
 SPARE = 1.15

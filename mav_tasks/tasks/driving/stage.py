@@ -8,21 +8,9 @@ would have ended.
 from dataclasses import replace
 from math import copysign, inf, pi, radians
 
-from mav_tasks.kinds import Face, GoTo, LocalPlace, Move, Rotate, SingleGoal
-from mav_tasks.settings import Driving, Turning
-from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.guidance import Motion, bend_speed, corner_speed, wrap
-from mav_tasks.tasks.driving.legs import (
-    FACE,
-    WAY,
-    begun_from,
-    begun_leg,
-    heading_to,
-    leg_of,
-    length_of,
-)
-from mav_tasks.tasks.driving.mission_sequencer import goal_of, goes_on_to_a_place
-from mav_tasks.tasks.driving.path import (
+from mav_tasks.kinds import Face, GoTo, LocalPlace, Move, Pose, Rotate, SingleGoal
+from mav_tasks.kinds.base import FACE, WAY
+from mav_tasks.kinds.path import (
     Follow,
     bearing,
     distance,
@@ -31,11 +19,17 @@ from mav_tasks.tasks.driving.path import (
     path_length,
     pose_on,
     seen_from,
+    wrap,
 )
+from mav_tasks.settings import Driving, Turning
+from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.guidance import Motion, bend_speed, corner_speed
+from mav_tasks.tasks.driving.legs import begun_leg
+from mav_tasks.tasks.driving.mission_sequencer import goal_of, goes_on_to_a_place
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to, way_to_pose
 from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.task import Pose, Progress, Task
+from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.view import VehicleView, place_of
 
 #: rad; a car stops before a larger turn: it may be shorter to reverse
@@ -65,7 +59,7 @@ def set_out(
         here = resumed(goal, progress, motion, turns_first=turns_first, steering=steering)
     elif not isinstance(goal, GoTo):
         done = 0.0 if isinstance(goal, Face) else progress.done  # its heading is absolute
-        here = replace(fresh, anchor=begun_from(goal, pose, done), leg=0, done=done, path=())
+        here = replace(fresh, anchor=goal.begun_from(pose, done), leg=0, done=done, path=())
     elif target is None:
         return None
     elif steering is not None:
@@ -115,14 +109,14 @@ def is_off_line(task: Task, pose: Pose) -> bool:
     anchor = progress.anchor
     if anchor is None:
         return False
-    leg = leg_of(goal_of(task), progress)
+    leg = goal_of(task).leg_of(progress)
     match leg:
         case Follow(path=path):
             along = nearest(anchor, path, pose, around=progress.done, window=inf)
             return distance(pose, pose_on(anchor, path, along)) > OFF_TRACK
         case Move():
             along, beside = _place_at(leg, anchor, pose)
-            return beside > OFF_TRACK or not -OFF_TRACK <= along <= length_of(leg) + PAST_END
+            return beside > OFF_TRACK or not -OFF_TRACK <= along <= leg.length + PAST_END
         case Rotate():
             return distance(pose, anchor) > OFF_TRACK
         case _:
@@ -138,7 +132,7 @@ def was_handled(task: Task, before: Pose, after: Pose) -> bool:
     has_turned = _is_turned(before, after, TURNED)
     if task.progress.anchor is None:
         return has_turned or distance(before, after) > PUT_BACK
-    leg = leg_of(goal_of(task), task.progress)
+    leg = goal_of(task).leg_of(task.progress)
     return isinstance(leg, Move) and (has_turned or _place_at(leg, before, after)[0] < -PUT_BACK)
 
 
@@ -158,14 +152,14 @@ def resumed(
     anchor, pose, target = progress.anchor, motion.pose, progress.target
     if not isinstance(goal, GoTo) or anchor is None or target is None:
         return progress
-    leg, is_near = leg_of(goal, progress), False
+    leg, is_near = goal.leg_of(progress), False
     if isinstance(leg, Follow):  # steering can return to a path by itself, near where it was left
         there = pose_on(anchor, leg.path, nearest(anchor, leg.path, pose, around=progress.done))
         is_turned = _is_turned(pose, there, TURNED)
         is_near = distance(pose, there) <= BESIDE_PATH and not is_turned and steering is not None
     elif isinstance(leg, Move):
         along, beside = _place_at(leg, anchor, pose)
-        is_near = beside <= OFF_TRACK and 0 <= along <= length_of(leg)
+        is_near = beside <= OFF_TRACK and 0 <= along <= leg.length
     elif progress.leg > WAY:
         is_near = distance(pose, target) <= max(goal.radius or 0.0, 2 * ON_SPOT)
     if is_near:
@@ -189,7 +183,7 @@ def recovery_path(
     """
     anchor, pose = progress.anchor, motion.pose
     assert anchor is not None, "what has begun has an anchor"
-    leg = leg_of(goal, progress)
+    leg = goal.leg_of(progress)
     if isinstance(leg, Rotate):
         there = replace(anchor, yaw=wrap(anchor.yaw + copysign(progress.done, leg.angle)))
         if distance(pose, there) <= ON_SPOT and not _is_turned(pose, there, TURNED):
@@ -198,7 +192,7 @@ def recovery_path(
     if not isinstance(leg, Move):
         return None
     along, beside = _place_at(leg, anchor, pose)
-    by_course, is_car, length = not honours_yaw_rate, steering is not None, length_of(leg)
+    by_course, is_car, length = not honours_yaw_rate, steering is not None, leg.length
     at, steers_back = min(max(progress.done, 0.0), length), False
     if -ON_SPOT <= along <= length + PAST_END and beside <= OFF_TRACK:
         steers_back = beside <= ON_SPOT or beside * CONVERGES <= length - along
@@ -258,4 +252,4 @@ def _target(goal: SingleGoal, seen: VehicleView) -> LocalPlace | None:
 
 
 def _bends_gently(goal: GoTo, pose: Pose, target: LocalPlace) -> bool:
-    return corner_speed(wrap(heading_to(goal, pose, target) - pose.yaw), lead=1.0) > 0.0
+    return corner_speed(wrap(goal.heading_to(pose, target) - pose.yaw), lead=1.0) > 0.0

@@ -9,13 +9,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import copysign, inf, pi, radians
 
-from mav_tasks.kinds import Move, Rotate
+from mav_tasks.kinds import Move, Pose, Rotate
+from mav_tasks.kinds.path import Follow, beside, cross_track, distance, forward_of, wrap
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import Ending, Motion, Velocity, is_far_off, wrap
-from mav_tasks.tasks.driving.path import Follow, beside, cross_track, distance, forward_of
+from mav_tasks.tasks.driving.guidance import Ending, Motion, Velocity, is_far_off
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.stage import OFF_TRACK, is_off_line
-from mav_tasks.tasks.task import Pose, Task, TaskId
+from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.view import VehicleView
 
 SAID_AFTER = 1.5  # s of commands without motion before the warning; the slowest rover took 0.6

@@ -12,14 +12,14 @@ from typer.testing import CliRunner
 
 from mav_tasks.cli.app import app
 from mav_tasks.errors import UsageError
-from mav_tasks.kinds import Drive, GlobalPlace, GoTo, Move, Wait
+from mav_tasks.kinds import Drive, GlobalPlace, GoTo, Move, Pose, Wait
 from mav_tasks.settings import Retention
 from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks import events as e
 from mav_tasks.tasks.events import ParameterSet, SignatureRefused, SignaturesSeen
 from mav_tasks.tasks.goal import Goal, Plan
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Frame, Marks, Pose, Progress, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task import Frame, Marks, Progress, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.timing import Timing
 
 SOMEBODY = Submitter("udpin:127.0.0.1:14560", "127.0.0.1:50000", 255, 190)

@@ -24,7 +24,7 @@ from mav_tasks.errors import RecordError
 from mav_tasks.in_memory import InMemoryServer
 from mav_tasks.key_ring import ring_file
 from mav_tasks.key_ring.ring import Entry, KeyRing
-from mav_tasks.kinds import Move
+from mav_tasks.kinds import Move, Pose
 from mav_tasks.links.memory import MemoryNet
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.observer import EngineObserver
@@ -33,7 +33,7 @@ from mav_tasks.recording.reading import read
 from mav_tasks.settings import Clients, Recording, Retention, Settings
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Marks, Pose, Progress, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task import Marks, Progress, Submitter, Task, TaskId, Terms
 from rover_sim.body import Pose as RoverPose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.vehicle import make_vehicle

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from mav_tasks.errors import StoreError
+from mav_tasks.kinds import Pose
 from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, Which, kind_of, open_store
 from mav_tasks.tasks.events import (
@@ -36,7 +37,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.task import MAX_TASK_ID, Pose, Progress, TaskId, Terms
+from mav_tasks.tasks.task import MAX_TASK_ID, Progress, TaskId, Terms
 from tests.kit.databases import locked, tables
 from tests.unit.store.samples import (
     OFFSET,

@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from mav_tasks.kinds import Move
+from mav_tasks.kinds import Move, Pose
 from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Marks, Pose, Submitter, Terms
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
 from mav_tasks.tasks.view import ModeKind, VehicleView
 
 SOMEBODY = Submitter("udpin:127.0.0.1:14560", "127.0.0.1:50000", 255, 190)

@@ -1,13 +1,13 @@
 """Where a rover stands that has been told to stop at the end: whether that is the end of it."""
 
-from mav_tasks.kinds import GoTo, LocalPlace, Move
+from mav_tasks.kinds import GoTo, LocalPlace, Move, Pose
+from mav_tasks.kinds.base import WAY
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.guidance import ZERO, Velocity
-from mav_tasks.tasks.driving.legs import WAY
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering
-from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.task import Progress
 from tests.unit.tasks.samples import ORIGIN, motion
 
 CAR = Steering(2.0, reverses=False)

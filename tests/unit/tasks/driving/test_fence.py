@@ -10,12 +10,11 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry import Polygon as Shape
 
-from mav_tasks.kinds import GlobalPlace, GoTo, LocalPlace, Move
+from mav_tasks.kinds import GlobalPlace, GoTo, LocalPlace, Move, Pose
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon, Zone, check
 from mav_tasks.tasks.driving.frames import to_global, to_local
 from mav_tasks.tasks.goal import Jump, SetSpeed
-from mav_tasks.tasks.task import Pose
 
 ORIGIN = GlobalPlace(0, 0)
 EAST = pi / 2

@@ -6,19 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.kinds import Move, Rotate, Wait
+from mav_tasks.kinds import Move, Pose, Rotate, Wait
+from mav_tasks.kinds.path import wrap
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import (
     CREEP_SPEED,
     ZERO,
     Velocity,
-    done_so_far,
     has_arrived,
     is_settled,
     steer,
-    wrap,
 )
-from mav_tasks.tasks.task import Pose
 
 DRIVING = Driving()
 HERE = Pose(0.0, 0.0, 0.0)  # facing north
@@ -30,7 +28,7 @@ poses = st.builds(Pose, lengths, lengths, st.floats(-pi, pi))
 
 def steered(goal: Move | Rotate, pose: Pose) -> Velocity:
     length = abs(goal.distance) if isinstance(goal, Move) else abs(goal.angle)
-    done = done_so_far(goal, HERE, pose, before=0.0)
+    done = goal.done_so_far(HERE, pose, before=0.0)
     return steer(goal, HERE, pose, remaining=length - done, driving=DRIVING)
 
 
@@ -44,7 +42,7 @@ def test_a_move_counts_along_its_heading_and_a_rotation_clockwise() -> None:
         (Rotate(pi), Pose(0.0, 0.0, 3.0), Pose(0.0, 0.0, -3.0), 2 * pi - 6.0),  # through south
         (Rotate(-pi), Pose(0.0, 0.0, 3.0), Pose(0.0, 0.0, -3.0), 6.0 - 2 * pi),
     ):
-        assert done_so_far(goal, anchor, pose, before=0.0) == pytest.approx(done), (goal, pose)
+        assert goal.done_so_far(anchor, pose, before=0.0) == pytest.approx(done), (goal, pose)
 
 
 def test_a_rotation_counts_full_turns() -> None:
@@ -52,7 +50,7 @@ def test_a_rotation_counts_full_turns() -> None:
         done = 0.0
         for step in range(1, 201):
             pose = Pose(0.0, 0.0, wrap(2.5 + angle * step / 200))
-            done = done_so_far(Rotate(angle), Pose(0.0, 0.0, 2.5), pose, before=done)
+            done = Rotate(angle).done_so_far(Pose(0.0, 0.0, 2.5), pose, before=done)
         assert done == pytest.approx(abs(angle))
 
 

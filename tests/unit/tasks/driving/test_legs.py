@@ -4,17 +4,10 @@ from math import pi, radians
 
 import pytest
 
-from mav_tasks.kinds import Face, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
-from mav_tasks.tasks.driving.legs import (
-    FACE,
-    WAY,
-    anchor_of,
-    begun_from,
-    leg_count,
-    leg_of,
-)
-from mav_tasks.tasks.driving.path import bearing
-from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.kinds import Face, GoTo, LocalPlace, Move, Pose, Rotate, SingleGoal, Wait
+from mav_tasks.kinds.base import FACE, WAY
+from mav_tasks.kinds.path import bearing
+from mav_tasks.tasks.task import Progress
 from tests.unit.tasks.samples import ORIGIN
 
 EAST_3 = LocalPlace(0.0, 3.0)
@@ -25,8 +18,8 @@ def test_a_way_is_facing_driving_turning_and_waiting() -> None:
     legs = []
     poses = (ORIGIN, Pose(0, 0, pi / 2), Pose(0, 3, pi / 2), Pose(0, 3, pi))
     for leg, pose in enumerate(poses):
-        anchor = anchor_of(goal, leg, pose, EAST_3)
-        legs.append(leg_of(goal, Progress(anchor=anchor, leg=leg, target=EAST_3)))
+        anchor = goal.anchor_of(leg, pose, EAST_3)
+        legs.append(goal.leg_of(Progress(anchor=anchor, leg=leg, target=EAST_3)))
     assert legs == [Rotate(pi / 2), Move(3.0, 0.7), Rotate(pi / 2), Wait(4.0)]
     goals = (
         Move(1.0),
@@ -36,15 +29,15 @@ def test_a_way_is_facing_driving_turning_and_waiting() -> None:
         GoTo(EAST_3, yaw=0.0),
         goal,
     )
-    assert [leg_count(each) for each in goals] == [1, 1, 2, 3, 3, 4]
+    assert [each.leg_count for each in goals] == [1, 1, 2, 3, 3, 4]
     progress = Progress(anchor=ORIGIN, leg=2, target=EAST_3)
-    assert leg_of(GoTo(EAST_3, wait=4.0), progress) == Wait(4.0)
+    assert GoTo(EAST_3, wait=4.0).leg_of(progress) == Wait(4.0)
 
 
 def test_the_way_counts_along_the_line_to_the_place_whatever_the_heading() -> None:
     pose = Pose(1.0, 0.0, 0.3)
-    assert anchor_of(GoTo(EAST_3), FACE, pose, EAST_3) == pose
-    assert anchor_of(GoTo(EAST_3), WAY, pose, LocalPlace(1.0, 5.0)) == Pose(1.0, 0.0, pi / 2)
+    assert GoTo(EAST_3).anchor_of(FACE, pose, EAST_3) == pose
+    assert GoTo(EAST_3).anchor_of(WAY, pose, LocalPlace(1.0, 5.0)) == Pose(1.0, 0.0, pi / 2)
     assert bearing(Pose(1.0, 2.0, 0.7), LocalPlace(1.0, 2.0)) == 0.7  # of where one is: one's own
 
 
@@ -63,7 +56,7 @@ def test_facing_turns_the_way_that_was_asked() -> None:
         (45, 405, -1, 0),
     ):
         goal = Face(radians(want), direction, 0.5)
-        leg = leg_of(goal, Progress(anchor=Pose(0, 0, radians(have))))
+        leg = goal.leg_of(Progress(anchor=Pose(0, 0, radians(have))))
         assert isinstance(leg, Rotate)
         assert leg.angle == pytest.approx(radians(turn), abs=1e-9)
         assert leg.rate == 0.5
@@ -78,6 +71,6 @@ def test_what_is_continued_from_here_began_where_its_end_is_right() -> None:
         (Wait(5.0), 2.0, Pose(10.0, 0.0, pi / 2)),
     )
     for goal, done, anchor in goals:
-        found = begun_from(goal, Pose(10.0, 0.0, pi / 2), done)
+        found = goal.begun_from(Pose(10.0, 0.0, pi / 2), done)
         wanted = anchor.north, anchor.east, anchor.yaw
         assert (found.north, found.east, found.yaw) == pytest.approx(wanted), goal

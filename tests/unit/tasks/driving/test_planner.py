@@ -6,12 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.kinds import GlobalPlace, GoTo, LocalPlace
-from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
-from mav_tasks.tasks.driving.frames import to_global
-from mav_tasks.tasks.driving.guidance import bend_speed, steer_along, wrap
-from mav_tasks.tasks.driving.path import (
+from mav_tasks.kinds import Bend, GlobalPlace, GoTo, LocalPlace, Pose
+from mav_tasks.kinds.path import (
     Follow,
     Path,
     beside,
@@ -20,7 +16,12 @@ from mav_tasks.tasks.driving.path import (
     path_length,
     pose_on,
     runs_of,
+    wrap,
 )
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
+from mav_tasks.tasks.driving.frames import to_global
+from mav_tasks.tasks.driving.guidance import bend_speed, steer_along
 from mav_tasks.tasks.driving.planner import (
     SPARE,
     Steering,
@@ -29,7 +30,7 @@ from mav_tasks.tasks.driving.planner import (
     way_to,
     way_to_pose,
 )
-from mav_tasks.tasks.task import Bend, Pose, Progress
+from mav_tasks.tasks.task import Progress
 from tests.unit.tasks.samples import motion
 
 RADIUS = 1.5

@@ -7,9 +7,10 @@ from typing import Any
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mav_tasks.kinds import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
+from mav_tasks.kinds import Bend, Drive, GoTo, LocalPlace, Move, Pose, Rotate, SingleGoal, Wait
+from mav_tasks.kinds.path import wrap
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import Motion, wrap
+from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering
 from mav_tasks.tasks.driving.stage import (
@@ -21,7 +22,7 @@ from mav_tasks.tasks.driving.stage import (
     resumed,
     was_handled,
 )
-from mav_tasks.tasks.task import Bend, Marks, Pose, Progress, Task, TaskId
+from mav_tasks.tasks.task import Marks, Progress, Task, TaskId
 from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE, motion
 
 ANCHOR = Pose(10.0, 20.0, radians(30))

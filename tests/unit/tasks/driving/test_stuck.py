@@ -2,11 +2,11 @@
 
 from math import pi
 
-from mav_tasks.kinds import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
+from mav_tasks.kinds import Drive, GoTo, LocalPlace, Move, Pose, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.driving.guidance import ZERO, Velocity
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.watches import BLIND, StuckWatch
-from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.task import Progress
 from tests.unit.tasks.samples import ORIGIN, motion, ours
 
 LIMIT, TICK = 10.0, 0.05

@@ -9,10 +9,9 @@ from cmath import phase, rect
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
-from math import atan2, copysign, hypot, pi, tau
+from math import atan2, copysign, cos, hypot, pi, sin, tau
 
-from mav_tasks.kinds import LocalPlace
-from mav_tasks.tasks.task import Bend, Pose
+from mav_tasks.kinds.places import Bend, LocalPlace, Pose
 
 Spot = LocalPlace | Pose
 Path = tuple[Bend, ...]
@@ -29,6 +28,27 @@ class Follow:
 
     path: Path
     speed: float | None = None
+
+    @property
+    def length(self) -> float:
+        """Its whole length, m."""
+        return path_length(self.path)
+
+    def done_so_far(
+        self,
+        anchor: Pose,
+        pose: Pose,
+        *,
+        before: float,
+        elapsed: float = 0.0,  # noqa: ARG002
+    ) -> float:
+        """The metres along it since the anchor: see ``Base``."""
+        return nearest(anchor, self.path, pose, around=before)
+
+
+def wrap(angle: float) -> float:
+    """Return an angle wrapped to ±pi."""
+    return atan2(sin(angle), cos(angle))
 
 
 def distance(here: Spot, there: Spot) -> float:
