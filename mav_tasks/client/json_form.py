@@ -108,7 +108,7 @@ TASK: Parts = {
     "progress": (attrgetter("progress"), or_null(NUMBER, "0 to 1")),
     "left": (
         lambda status: _rounded(left(status)[0]),
-        or_null(NUMBER, "what is left of it"),
+        or_null(NUMBER, "how much of it is left"),
     ),
     "left_unit": (
         lambda status: left(status)[1],

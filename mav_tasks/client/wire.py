@@ -22,7 +22,6 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_
 
 #: the goals that a client can submit; angles in radians
 Goal = Move | Rotate | Drive | GoTo | Face | Wait
-Command = m.CommandLong | m.CommandInt
 
 #: the address of the task server itself, where it takes tasks for any of its rovers
 SERVER = Address(250, 191)
