@@ -3,6 +3,7 @@
 SI units and radians; angles clockwise from north. Frozen values.
 """
 
+from mav_tasks.kinds.base import Leg, Unit
 from mav_tasks.kinds.drive import Drive, Head
 from mav_tasks.kinds.goto import GoTo
 from mav_tasks.kinds.move import Move, MoveTurned
@@ -20,6 +21,7 @@ __all__ = [
     "GlobalPlace",
     "GoTo",
     "Head",
+    "Leg",
     "LocalPlace",
     "Move",
     "MoveTurned",
@@ -27,5 +29,6 @@ __all__ = [
     "Pose",
     "Rotate",
     "SingleGoal",
+    "Unit",
     "Wait",
 ]

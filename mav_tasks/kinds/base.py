@@ -1,13 +1,29 @@
-"""What the server asks of a goal, or a step of a plan; a kind answers what is special about it."""
+"""What the server asks of a goal, a step of a plan or a leg; a kind answers what is special."""
 
-from typing import Any, NamedTuple, Protocol
+from enum import Enum, auto
+from math import radians, sqrt
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
+from mav_tasks.kinds.guidance import ZERO, Situation, Velocity
+from mav_tasks.kinds.path import Spot, wrap
 from mav_tasks.kinds.places import Bend, LocalPlace, Pose
-from mav_tasks.settings import Turning
+from mav_tasks.settings import Driving, Turning
 
 #: the legs of a way to a place: face it (as a car: drive to where the last run to it begins),
 #: drive there; others may follow
 FACE, WAY = range(2)
+OFF_TRACK = 1.0  # m off its line; farther off, a task does not resume after a takeover (lifecycle)
+PAST_END = 0.1  # m, the same for the end of the line
+ON_SPOT = 0.02  # m; nearer counts as there
+TURNED = radians(30)  # rad; a smaller heading error cannot hide a whole turn
+
+
+class Unit(Enum):
+    """What a leg is counted in."""
+
+    METRES = auto()
+    RADIANS = auto()
+    SECONDS = auto()
 
 
 class Ability(NamedTuple):
@@ -65,6 +81,14 @@ class WhyNot(NamedTuple):
     param: int = 0
 
 
+class Took(NamedTuple):
+    """An estimate of the rest of a leg: seconds, metres of way, and the pose at its end."""
+
+    seconds: float
+    metres: float
+    pose: Pose
+
+
 class Begun(Protocol):
     """How far a task has got, as far as a leg follows from it: see ``Progress``."""
 
@@ -92,10 +116,18 @@ class Base:
 
     __slots__ = ()
 
+    is_absolute: ClassVar[bool] = False  # it ends at a place or heading, wherever it begins
+    stays: ClassVar[bool] = True  # it ends where it begins
+
     @property
     def named_speed(self) -> float:
         """The speed that it names, m/s; 0 if it names none."""
         return 0.0
+
+    @property
+    def is_instant(self) -> bool:
+        """Whether it takes next to no time."""
+        return False
 
     def why_not(self, ability: Ability) -> WhyNot | None:  # noqa: ARG002
         """Why a vehicle of this ability cannot drive it; None: it can."""
@@ -117,8 +149,9 @@ class Base:
         """The anchor of a leg that begins at ``pose``."""
         return pose
 
-    def leg_of(self, progress: Begun) -> Any:  # noqa: ARG002
-        """The leg that is being driven: a goal that ``guidance`` can steer."""
+    def leg_of(self, progress: Begun) -> "Leg":  # noqa: ARG002
+        """The leg that is being driven."""
+        assert isinstance(self, Leg), "a goal of several legs says which"
         return self
 
     def begun_from(self, pose: Pose, done: float) -> Pose:  # noqa: ARG002
@@ -127,6 +160,42 @@ class Base:
         It is for a task that resumes from here because its own anchor is lost.
         """
         return pose
+
+    def done_at(self, done: float, *, utc: float) -> float:  # noqa: ARG002
+        """How much is done when it begins or resumes, of which ``done`` was before."""
+        return done
+
+    def end_of(self, progress: Begun) -> Spot | None:  # noqa: ARG002
+        """Where it ends, if that is known."""
+        return None
+
+    def loses_count(self, progress: Begun) -> bool:  # noqa: ARG002
+        """Whether a pose alone cannot tell how much of its leg is done."""
+        return False
+
+
+class Leg(Base):
+    """A piece of a goal that is driven at one time; the answers are for one that lasts a time."""
+
+    __slots__ = ()
+
+    unit: ClassVar[Unit] = Unit.SECONDS
+    is_standing: ClassVar[bool] = False  # the vehicle stands all the time
+    pivots: ClassVar[bool] = False  # a vehicle that points elsewhere turns before it drives
+
+    @property
+    def length(self) -> float:
+        """The whole of it, in its unit."""
+        raise NotImplementedError
+
+    @property
+    def has_end(self) -> bool:
+        """Whether it has an end to come nearer to; otherwise it lasts for a time."""
+        return self.unit is not Unit.SECONDS
+
+    def at_speed(self, speed: float) -> Self:  # noqa: ARG002
+        """It at another speed, m/s."""
+        return self
 
     def done_so_far(
         self,
@@ -142,3 +211,63 @@ class Base:
         the vehicle is behind its anchor.
         """
         return before + elapsed
+
+    def steer(self, now: Situation) -> Velocity:  # noqa: ARG002
+        """The velocity to command now."""
+        return ZERO
+
+    def is_within(self, remaining: float, *, metres: float, angle: float) -> bool:
+        """Whether its end is this near; a time has to be over."""
+        if self.unit is Unit.SECONDS:
+            return remaining <= 0.0
+        return abs(remaining) <= (angle if self.unit is Unit.RADIANS else metres)
+
+    def took(self, left: float, anchor: Pose, speed: float, driving: Driving) -> Took:  # noqa: ARG002
+        """An estimate of its rest, ``left``, at this speed if it names none."""
+        return Took(left, 0.0, anchor)
+
+    # where the vehicle may be
+
+    def beside(self, anchor: Pose, pose: Pose, done: float) -> float | None:  # noqa: ARG002
+        """The metres to either side of its line; None: it has none."""
+        return None
+
+    def is_left(self, anchor: Pose, pose: Pose, done: float) -> bool:  # noqa: ARG002
+        """Whether a pose is so far off that a person must decide before it goes on."""
+        return False
+
+    def was_handled(self, before: Pose, after: Pose) -> bool:  # noqa: ARG002
+        """Whether a vehicle that went from one pose to the other was moved by somebody else."""
+        return False
+
+    def goes_on_from(self, anchor: Pose, pose: Pose, done: float, *, is_car: bool) -> bool:  # noqa: ARG002
+        """Whether the way to a place goes on here, and does not begin again."""
+        return False
+
+    def way_back(
+        self,
+        anchor: Pose,  # noqa: ARG002
+        pose: Pose,  # noqa: ARG002
+        done: float,  # noqa: ARG002
+        *,
+        by_course: bool,  # noqa: ARG002
+        is_car: bool,  # noqa: ARG002
+    ) -> Pose | None:
+        """The pose from which it goes on exactly; None: this one.
+
+        A vehicle that is steered by course corrects its heading while it drives on, unless it is a
+        car.
+        """
+        return None
+
+
+def ramped(way: float, top: float, acceleration: float) -> float:
+    """Return the seconds for a distance with equal ramps up and down."""
+    if way * acceleration < top * top:
+        return 2 * sqrt(way / acceleration)
+    return way / top + top / acceleration
+
+
+def is_turned(pose: Pose, other: Pose, most: float) -> bool:
+    """Return whether two headings differ by more than ``most`` rad."""
+    return abs(wrap(other.yaw - pose.yaw)) > most

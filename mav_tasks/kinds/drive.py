@@ -1,22 +1,26 @@
 """Drive and Head: keep a velocity for a time, with a yaw rate or on a heading."""
 
 from dataclasses import dataclass, replace
-from math import degrees
+from math import copysign, degrees
 from typing import ClassVar
 
-from mav_tasks.kinds.base import Ability, Base, Begun, WhyNot, anchor_in
+from mav_tasks.kinds.base import Ability, Begun, Leg, Took, WhyNot, anchor_in
 from mav_tasks.kinds.form import DEGREE, DURATION, Form, any_number
-from mav_tasks.kinds.path import wrap
+from mav_tasks.kinds.guidance import Situation, Velocity, towards
+from mav_tasks.kinds.path import moved, wrap
+from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
+from mav_tasks.settings import Driving
 
 
 @dataclass(frozen=True, slots=True)
-class Drive(Base):
+class Drive(Leg):
     """Keep a velocity for a time: m/s forward, rad/s clockwise, ``duration`` in seconds."""
 
     rule: ClassVar[str] = "drive"
+    stays: ClassVar[bool] = False
     forward: float
     yaw_rate: float
     duration: float
@@ -44,18 +48,27 @@ class Drive(Base):
 
     @property
     def length(self) -> float:
-        """How long it lasts, s."""
         return self.duration
+
+    def steer(self, now: Situation) -> Velocity:
+        return Velocity(self.forward, self.yaw_rate, now.anchor.yaw if now.by_course else None)
+
+    def took(self, left: float, anchor: Pose, speed: float, driving: Driving) -> Took:  # noqa: ARG002
+        curvature = self.yaw_rate / self.forward if self.forward else 0.0
+        there = moved(anchor, curvature, self.forward * self.duration)
+        turned = replace(there, yaw=wrap(anchor.yaw + self.yaw_rate * self.duration))
+        return Took(left, abs(self.forward) * left, turned)
 
 
 @dataclass(frozen=True, slots=True)
-class Head(Base):
+class Head(Leg):
     """Drive towards a heading for a time: ``yaw`` in radians, ``forward`` in m/s.
 
     ``is_relative``: the yaw counts from the heading at the start.
     """
 
     rule: ClassVar[str] = "drive"
+    stays: ClassVar[bool] = False
     yaw: float
     forward: float
     duration: float
@@ -78,8 +91,18 @@ class Head(Base):
 
     @property
     def length(self) -> float:
-        """How long it lasts, s."""
         return self.duration
+
+    def at_speed(self, speed: float) -> "Head":
+        forward = copysign(speed, self.forward) if self.forward else 0.0
+        return replace(self, forward=forward)
+
+    def steer(self, now: Situation) -> Velocity:
+        return towards(wrap(self.yaw - now.motion.pose.yaw), self.forward, now)
+
+    def took(self, left: float, anchor: Pose, speed: float, driving: Driving) -> Took:  # noqa: ARG002
+        end = moved(replace(anchor, yaw=self.yaw), 0.0, self.forward * self.duration)
+        return Took(left, abs(self.forward) * left, end)
 
     def leg_of(self, progress: Begun) -> "Head":
         if not self.is_relative:

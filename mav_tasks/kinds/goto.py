@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 from math import degrees, pi, tau
-from typing import Any
+from typing import Any, ClassVar
 
 from mav_tasks.kinds.base import FACE, WAY, Ability, Base, Begun, anchor_in
+from mav_tasks.kinds.follow import Follow
 from mav_tasks.kinds.form import DEGREE, HEADING, SPEED, Form, any_number, positive
 from mav_tasks.kinds.move import Move
-from mav_tasks.kinds.path import Follow, bearing, distance, wrap
+from mav_tasks.kinds.path import bearing, distance, wrap
 from mav_tasks.kinds.places import GlobalPlace, LocalPlace, Place, Pose
 from mav_tasks.kinds.rotate import Rotate, turn_to
 from mav_tasks.kinds.sent import Sent
@@ -36,6 +37,7 @@ class GoTo(Base):
     counter-clockwise. ``backwards``: it drives there backwards.
     """
 
+    is_absolute: ClassVar[bool] = True
     place: Place | None
     speed: float | None = None
     radius: float | None = None
@@ -86,6 +88,9 @@ class GoTo(Base):
             return pose
         assert target is not None, "the place was found before the task began"
         return replace(pose, yaw=self.heading_to(pose, target))
+
+    def end_of(self, progress: Begun) -> LocalPlace | None:
+        return progress.target
 
     def leg_of(self, progress: Begun) -> Move | Rotate | Follow | Wait:
         anchor, target = anchor_in(progress), progress.target

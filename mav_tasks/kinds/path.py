@@ -7,7 +7,7 @@ in one direction, forwards or backwards.
 
 from cmath import phase, rect
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
 from math import atan2, copysign, cos, hypot, pi, sin, tau
 
@@ -20,30 +20,6 @@ Path = tuple[Bend, ...]
 #: crosses itself, the nearest place may be one that is yet to come
 WINDOW = 1.0
 STRAIGHT = 1e-9  # 1/m; less curvature counts as straight
-
-
-@dataclass(frozen=True, slots=True)
-class Follow:
-    """Drive along a path; ``speed`` in m/s, None = default."""
-
-    path: Path
-    speed: float | None = None
-
-    @property
-    def length(self) -> float:
-        """Its whole length, m."""
-        return path_length(self.path)
-
-    def done_so_far(
-        self,
-        anchor: Pose,
-        pose: Pose,
-        *,
-        before: float,
-        elapsed: float = 0.0,  # noqa: ARG002
-    ) -> float:
-        """The metres along it since the anchor: see ``Base``."""
-        return nearest(anchor, self.path, pose, around=before)
 
 
 def wrap(angle: float) -> float:

@@ -1,27 +1,48 @@
 """Rotate and Face: turn on the spot, by an angle or to a heading."""
 
 from dataclasses import dataclass, replace
-from math import copysign, degrees, pi, tau
+from math import copysign, degrees, pi, radians, tau
 from typing import ClassVar
 
-from mav_tasks.kinds.base import Ability, Base, Begun, WhyNot, anchor_in
+from mav_tasks.kinds.base import (
+    OFF_TRACK,
+    ON_SPOT,
+    TURNED,
+    Ability,
+    Base,
+    Begun,
+    Leg,
+    Took,
+    Unit,
+    WhyNot,
+    anchor_in,
+    is_turned,
+    ramped,
+)
 from mav_tasks.kinds.form import DEGREE, HEADING, RATE, Form, any_number
-from mav_tasks.kinds.path import wrap
+from mav_tasks.kinds.guidance import Situation, Velocity, approach
+from mav_tasks.kinds.path import distance, wrap
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.setting_keys.parts import Part
 from mav_tasks.setting_keys.shapes import Number
+from mav_tasks.settings import Driving
+
+AHEAD = 0.5  # s by which the course leads the heading if a vehicle turns to it by itself
+LEAST_AHEAD = radians(10)  # rad, least lead
+UNSEEN = 3.0  # rad; a larger turn looks like a smaller one the other way
 
 
 @dataclass(frozen=True, slots=True)
-class Rotate(Base):
+class Rotate(Leg):
     """Turn on the spot: ``angle`` in radians, clockwise positive, may exceed a full turn.
 
     ``rate`` in rad/s, positive, None = default.
     """
 
     rule: ClassVar[str] = "rotate"
+    unit: ClassVar[Unit] = Unit.RADIANS
     angle: float
     rate: float | None = None
 
@@ -38,8 +59,10 @@ class Rotate(Base):
 
     @property
     def length(self) -> float:
-        """Its whole angle, rad."""
         return abs(self.angle)
+
+    def loses_count(self, progress: Begun) -> bool:  # noqa: ARG002
+        return abs(self.angle) > UNSEEN
 
     def begun_from(self, pose: Pose, done: float) -> Pose:
         return replace(pose, yaw=wrap(pose.yaw - copysign(done, self.angle)))
@@ -58,6 +81,42 @@ class Rotate(Base):
         turned = copysign(1.0, self.angle) * (pose.yaw - anchor.yaw)
         return before + wrap(turned - before)
 
+    def steer(self, now: Situation) -> Velocity:
+        towards_end = approach(
+            now.remaining,
+            top=self.rate or now.driving.turn_rate,
+            braking=now.driving.turn_acceleration,
+            gain=now.slowest.turn_gain,
+            creep=now.slowest.rate,
+        )
+        turn = copysign(towards_end, self.angle * now.remaining)
+        if not now.by_course:
+            return Velocity(0.0, turn)
+        # it turns by itself at its full rate: keep the lead small
+        ahead = max(LEAST_AHEAD, AHEAD * abs(turn))
+        lead = copysign(min(abs(now.remaining), ahead), turn)
+        return Velocity(0.0, 0.0, wrap(now.motion.pose.yaw + lead))
+
+    def took(self, left: float, anchor: Pose, speed: float, driving: Driving) -> Took:  # noqa: ARG002
+        seconds = ramped(left, self.rate or driving.turn_rate, driving.turn_acceleration)
+        return Took(seconds, 0.0, replace(anchor, yaw=wrap(anchor.yaw + self.angle)))
+
+    def is_left(self, anchor: Pose, pose: Pose, done: float) -> bool:  # noqa: ARG002
+        return distance(pose, anchor) > OFF_TRACK
+
+    def way_back(
+        self,
+        anchor: Pose,
+        pose: Pose,
+        done: float,
+        *,
+        by_course: bool,  # noqa: ARG002
+        is_car: bool,  # noqa: ARG002
+    ) -> Pose | None:
+        there = replace(anchor, yaw=wrap(anchor.yaw + copysign(done, self.angle)))
+        is_there = distance(pose, there) <= ON_SPOT and not is_turned(pose, there, TURNED)
+        return None if is_there else there
+
 
 @dataclass(frozen=True, slots=True)
 class Face(Base):
@@ -68,6 +127,7 @@ class Face(Base):
     """
 
     rule: ClassVar[str] = "rotate"
+    is_absolute: ClassVar[bool] = True
     yaw: float
     direction: int = 0
     rate: float | None = None

@@ -3,14 +3,18 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from mav_tasks.kinds.base import Base
+from mav_tasks.kinds.base import Leg
 from mav_tasks.kinds.form import DURATION, Form
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 
+MINUTE, HOUR, DAY = 60.0, 3600.0, 86_400.0  # s
+SHORT = 1.0  # s; a loop of shorter waits would only keep the server busy
+LATE = 1.0  # s that a clock may have been set back by
+
 
 @dataclass(frozen=True, slots=True)
-class Wait(Base):
+class Wait(Leg):
     """Stand for ``duration`` seconds.
 
     With ``until`` it stands until that time of day (UTC), and ``duration`` is when it comes again:
@@ -18,6 +22,7 @@ class Wait(Base):
     """
 
     rule: ClassVar[str] = "wait"
+    is_standing: ClassVar[bool] = True
     duration: float
     until: tuple[int, ...] = ()
 
@@ -33,8 +38,19 @@ class Wait(Base):
 
     @property
     def length(self) -> float:
-        """How long it lasts, s."""
         return self.duration
+
+    @property
+    def is_instant(self) -> bool:
+        return self.duration < SHORT
+
+    def done_at(self, done: float, *, utc: float) -> float:
+        if not self.until:
+            return done
+        hours, minutes, seconds = (max(part, 0) for part in self.until)
+        left = (hours * HOUR + minutes * MINUTE + seconds - utc) % self.duration
+        over = self.duration - left
+        return over if over >= done - LATE else self.duration  # that time came meanwhile
 
 
 FORM = Form("wait", "Wait", "Stand still.", (DURATION,), Wait)

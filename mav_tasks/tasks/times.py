@@ -3,23 +3,10 @@
 from heapq import heapify, heappop, heappush
 from math import inf
 
-from mav_tasks.kinds import Wait
 from mav_tasks.tasks.task import Task, TaskId, Terms
 
-DAY, HOUR, MINUTE = 86_400.0, 3_600.0, 60.0  # s
 SPARE = 64  # outdated entries of the heap that do not matter
 UNTIMED = (None, None, None, None)
-LATE = 1.0  # s that a clock may have been set back by
-
-
-def waited(goal: Wait, done: float, *, utc: float) -> float:
-    """Return how much of a wait is over; ``done`` is how much of it was when it was interrupted."""
-    if not goal.until:
-        return done
-    hours, minutes, seconds = (max(part, 0) for part in goal.until)
-    left = (hours * HOUR + minutes * MINUTE + seconds - utc) % goal.duration
-    over = goal.duration - left
-    return over if over >= done - LATE else goal.duration  # that time came meanwhile
 
 
 class Times:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from math import inf
 
 from mav_tasks.errors import Rejection
-from mav_tasks.kinds import MoveTurned, Rotate
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.executor import has_moved
 from mav_tasks.tasks.driving.mission_sequencer import (
@@ -481,7 +480,5 @@ def _check_remainder(task: Task, seen: VehicleView) -> None:
     progress, goal = task.progress, goal_of(task)
     if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
         return
-    leg = goal.leg_of(progress) if isinstance(goal, Rotate | MoveTurned) else None
-    is_turned = isinstance(leg, Rotate) and abs(leg.angle) > 3.0
-    if is_turned or not same_frame(progress.frame, seen.frame):
+    if goal.loses_count(progress) or not same_frame(progress.frame, seen.frame):
         raise Rejection(R.WRONG_STATE, f"the progress of task {task.id} is unknown: {again}")

@@ -25,13 +25,13 @@ from mav_tasks.kinds import (
     SingleGoal,
     Wait,
 )
+from mav_tasks.kinds.wait import DAY, HOUR, MINUTE
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.commands import Command
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Marks, Terms
-from mav_tasks.tasks.times import DAY, HOUR, MINUTE
 
 R = TaskReason
 

@@ -5,8 +5,7 @@
 
 from math import isfinite, nan
 
-from mav_tasks.kinds import Face, GoTo, Move, MoveTurned, Rotate
-from mav_tasks.kinds.path import Follow
+from mav_tasks.kinds import GoTo, Leg, Unit
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -100,8 +99,7 @@ FINISHED = 1.0  # param4 of REQUEST_MESSAGE(TASK_STATUS, 0): finished tasks
 
 UNIT_NONE = 0  # TASK_UNIT
 UNIT_METRES = 1
-UNIT_RADIANS = 2
-UNIT_SECONDS = 3
+UNITS = {Unit.METRES: UNIT_METRES, Unit.RADIANS: 2, Unit.SECONDS: 3}
 FLOAT32_MAX = 3.4e38
 UNKNOWN_POSITION = 65535
 LAST_POSITION = 65534  # this or a later position: a queue may be longer than the field allows
@@ -307,16 +305,11 @@ def _left(task: Task, tasks: VehicleTasks) -> tuple[int, float]:
     goal = present_goal(task.goal, task.progress)
     if task.progress.anchor is not None:
         leg = goal.leg_of(task.progress)
-    elif isinstance(goal, GoTo | MoveTurned | Face):
-        return UNIT_NONE, nan  # the size of its first leg is not known before it starts
-    else:
+    elif isinstance(goal, Leg):
         leg = goal
-    unit = UNIT_SECONDS
-    if isinstance(leg, Move | Follow):
-        unit = UNIT_METRES
-    elif isinstance(leg, Rotate):
-        unit = UNIT_RADIANS
-    return unit, max(0.0, leg.length - task.progress.done)
+    else:
+        return UNIT_NONE, nan  # the size of its first leg is not known before it starts
+    return UNITS[leg.unit], max(0.0, leg.length - task.progress.done)
 
 
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:

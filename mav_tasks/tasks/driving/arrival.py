@@ -10,18 +10,17 @@ the settling distance is good enough, and the task's status shows it.
 
 from math import radians
 
-from mav_tasks.kinds import Move, Rotate
-from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import (
+from mav_tasks.kinds import Unit
+from mav_tasks.kinds.guidance import (
     APPROACH_GAIN,
     CREEP_RATE,
     CREEP_SPEED,
     TURN_GAIN,
-    Ending,
     Motion,
     Slowest,
     Velocity,
 )
+from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.path_follower import PathFollower
 
 CORRECTIONS = 2  # corrections of the end from a standstill
@@ -137,9 +136,9 @@ class Arrival:
         ``last`` is the last velocity commanded. If the rover also ``stands``, it has arrived.
         """
         leg, left = course.leg, abs(course.remaining)
-        if not isinstance(leg, Ending):
+        if not leg.has_end:
             return course.has_arrived(stands=stands, driving=driving)
-        is_turn = isinstance(leg, Rotate)
+        is_turn = leg.unit is Unit.RADIANS
         creeping = self.around if is_turn else self._driven(course)
         if stands:
             return self._judge(course, creeping, driving=driving)
@@ -148,7 +147,7 @@ class Arrival:
         is_stalled = self._gives_up or now - self._best_at > STALLED
         self._gives_up = is_stalled and course.is_settled(driving=driving)
         asked = abs(last.yaw_rate if is_turn else last.forward)
-        turns_to_heading = isinstance(leg, Move) and abs(motion.yaw_rate) > TURNS
+        turns_to_heading = leg.pivots and abs(motion.yaw_rate) > TURNS
         is_slow = 0.0 < asked <= MOST_CREEP and not turns_to_heading and left <= NEAR
         self._look_for_effect(course, creeping, asked if is_slow else None, now=now)
         if self._is_settling or self._gives_up:

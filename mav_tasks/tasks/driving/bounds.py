@@ -8,13 +8,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, copysign, isfinite, sqrt
 
-from mav_tasks.kinds import Drive, GlobalPlace, GoTo, Head, Move, MoveTurned, Pose, SingleGoal
-from mav_tasks.kinds.base import WAY
-from mav_tasks.kinds.path import Spot, distance, moved, pose_on, rest_of, wrap
+from mav_tasks.kinds import GlobalPlace, GoTo, Pose, SingleGoal
+from mav_tasks.kinds.guidance import ZERO, Motion, Velocity, clamped
+from mav_tasks.kinds.path import distance, pose_on, rest_of, wrap
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Fence, LocalFence
 from mav_tasks.tasks.driving.frames import local_place, to_local
-from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, clamped
 from mav_tasks.tasks.driving.mission_sequencer import ways_on
 from mav_tasks.tasks.driving.planner import is_allowed
 from mav_tasks.tasks.goal import Step
@@ -141,7 +140,7 @@ class Bounds:
         From outside, the way may lead back in. A goal without a place to end at is allowed, and
         watched while it drives.
         """
-        fence, end = self.local(origin), _end_of(goal, progress)
+        fence, end = self.local(origin), goal.end_of(progress)
         if fence is None or end is None:
             return None
         if progress.path and progress.anchor is not None:
@@ -175,18 +174,6 @@ class Bounds:
         return min(self.rally, key=lambda place: distance(pose, to_local(place, origin)))
 
 
-def _end_of(goal: SingleGoal, progress: Progress) -> Spot | None:
-    if isinstance(goal, GoTo):
-        return progress.target
-    anchor = progress.anchor
-    if anchor is None or not isinstance(goal, Move | MoveTurned):
-        return None
-    way = goal.distance
-    if isinstance(goal, MoveTurned) and progress.leg != WAY:
-        way = -way if progress.leg < WAY else 0.0  # it has not turned round yet, or is there
-    return moved(anchor, 0.0, way)
-
-
 def _next_places(steps: Sequence[Step], number: int) -> list[int]:
     """Return the steps whose places may come next, whichever jumps are taken."""
     found: list[int] = []
@@ -199,6 +186,6 @@ def _next_places(steps: Sequence[Step], number: int) -> list[int]:
         seen.add(step)
         if isinstance(steps[step], GoTo):
             found.append(step)
-        elif not isinstance(steps[step], Move | MoveTurned | Drive | Head):  # its end is not known
+        elif steps[step].stays:
             waiting += ways_on(steps, step)
     return found

@@ -7,13 +7,14 @@ from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
-from mav_tasks.kinds import Face, GoTo, MoveTurned, Rotate, Wait
-from mav_tasks.settings import Driving, Settings, Turning
+from mav_tasks.kinds import GoTo
+from mav_tasks.kinds.base import Ability
+from mav_tasks.kinds.guidance import ZERO, Motion
+from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.bounds import Bounds, limited, within_fence
 from mav_tasks.tasks.driving.estimate import Estimate, Known, time_left
-from mav_tasks.tasks.driving.guidance import ZERO, Ending, Motion
 from mav_tasks.tasks.driving.mission_sequencer import (
     begun,
     following,
@@ -34,7 +35,7 @@ from mav_tasks.tasks.goal import Near, Plan
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Progress, Task
-from mav_tasks.tasks.times import Times, waited
+from mav_tasks.tasks.times import Times
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 
 S, R = TaskState, TaskReason
@@ -149,15 +150,16 @@ class Drive:
             if waits:
                 self._course = None
                 return progress
-        if seen.turning is Turning.STEERED and isinstance(goal, Rotate | Face | MoveTurned):
+        ability = Ability(seen.honours_yaw_rate, seen.turning, turns_by_course=seen.turns_by_course)
+        if ability.is_steered and goal.why_not(ability):
             raise Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
         course = set_out(goal, begun(plan, progress), seen, motion, self._bounds)
         if course is None:
             raise Becomes(S.PAUSED, R.POSITION_LOST)
         here = course.progress
-        if isinstance(goal, Wait):
-            here = replace(here, done=waited(goal, here.done, utc=now + self._times.wall_offset))
-            course.progress = here
+        done = goal.done_at(here.done, utc=now + self._times.wall_offset)
+        if done != here.done:
+            course.progress = here = replace(here, done=done)
         if (course.metres_to_place(motion) or 0.0) > driving.max_distance:
             raise Becomes(S.FAILED, R.BAD_PARAMETER)
         if task.terms.max_distance is not None:
@@ -242,7 +244,7 @@ class Drive:
             driving=self.settings.driving,
             now=now,
         ):
-            if not stands and not isinstance(course.leg, Wait):
+            if not stands and not course.leg.is_standing:
                 return view.STAND
             return self._arrive(tick, course) or view.STAND
         if is_held_back:
@@ -267,7 +269,7 @@ class Drive:
         top = task.terms.top_speed
         if top is not None and abs(wish.forward) > top:
             wish = replace(wish, forward=copysign(top, wish.forward))
-        if self._is_coming_back and isinstance(course.leg, Ending):
+        if self._is_coming_back and course.leg.has_end:
             self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
             if self._is_coming_back:  # from outside the fence it may drive in
                 return Demand(DemandKind.DRIVE, wish)

@@ -5,12 +5,11 @@ corrections near the end, pauses, and a car's bends, but for those of the run th
 """
 
 from dataclasses import replace
-from math import nan, sqrt
+from math import nan
 from typing import NamedTuple
 
-from mav_tasks.kinds import Drive, Face, GlobalPlace, GoTo, Head, Move, Pose, Rotate, SingleGoal
+from mav_tasks.kinds import GlobalPlace, GoTo, Pose, SingleGoal
 from mav_tasks.kinds.base import WAY
-from mav_tasks.kinds.path import Follow, moved, wrap
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import begun, following, is_over, present_goal
@@ -74,7 +73,7 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
         target = local_place(known.home if goal.place is None else goal.place, known.origin)
     pose = known.pose
     is_unknown = pose is None or (isinstance(goal, GoTo) and target is None)
-    if is_unknown and progress.anchor is None and isinstance(goal, GoTo | Face):
+    if is_unknown and progress.anchor is None and goal.is_absolute:
         return UNKNOWN
     at, seconds, metres, driving = pose or SOMEWHERE, SETTLING, 0.0, known.driving
     for number in range(progress.leg, goal.leg_count):
@@ -85,30 +84,9 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
             present = Progress(anchor=at, leg=number, target=target)
         leg = goal.leg_of(present)
         left = max(0.0, leg.length - present.done)
-        took, way = left, 0.0
-        match leg:
-            case Move(speed=own) | Follow(speed=own):
-                took, way = _ramped(left, own or speed, driving.acceleration), left
-                at = moved(at, 0.0, leg.distance) if isinstance(leg, Move) else at
-            case Rotate(angle=angle, rate=rate):
-                took = _ramped(left, rate or driving.turn_rate, driving.turn_acceleration)
-                at = replace(at, yaw=wrap(at.yaw + angle))
-            case Head(yaw=heading, forward=forward, duration=duration):
-                way = abs(forward) * left
-                at = moved(replace(at, yaw=heading), 0.0, forward * duration)
-            case Drive(forward=forward, yaw_rate=turn, duration=duration):
-                way = abs(forward) * left
-                there = moved(at, turn / forward if forward else 0.0, forward * duration)
-                at = replace(there, yaw=wrap(at.yaw + turn * duration))
+        took, way, at = leg.took(left, at, speed, driving)
         if number == WAY and target is not None:
             at = replace(at, north=target.north, east=target.east)
         seconds += took
         metres += way
     return Estimate(seconds, None if pose is None and progress.anchor is None else at, metres)
-
-
-def _ramped(way: float, top: float, acceleration: float) -> float:
-    """Return the seconds for a distance with equal ramps up and down."""
-    if way * acceleration < top * top:
-        return 2 * sqrt(way / acceleration)
-    return way / top + top / acceleration

@@ -27,7 +27,6 @@ from mav_tasks.tasks.goal import (
 )
 from mav_tasks.tasks.task import Progress, Task
 
-SHORT = 1.0  # s; a loop of shorter waits would only keep the server busy
 END = Wait(0.0)  # past the last step: pending steps are still done
 
 
@@ -144,7 +143,7 @@ def look_on_the_way(
 
 def _takes_no_time(plan: Plan, step: int) -> bool:
     goal = _driven(plan, step)
-    return goal is None or (isinstance(goal, Wait) and goal.duration < SHORT)
+    return goal is None or goal.is_instant
 
 
 def ways_on(steps: Sequence[Step], step: int) -> list[int]:

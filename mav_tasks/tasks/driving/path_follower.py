@@ -1,14 +1,12 @@
 """Follows one goal, leg after leg: where the vehicle is → the velocity to command, or the end."""
 
 from dataclasses import dataclass, replace
-from math import copysign
 
-from mav_tasks.kinds import GoTo, Head, Pose, SingleGoal
+from mav_tasks.kinds import GoTo, Leg, Pose, SingleGoal, Unit
 from mav_tasks.kinds.base import FACE, WAY
-from mav_tasks.kinds.path import Follow, distance
+from mav_tasks.kinds.guidance import USUAL, Motion, Situation, Slowest, Velocity
+from mav_tasks.kinds.path import distance
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving import guidance
-from mav_tasks.tasks.driving.guidance import USUAL, Leg, Line, Motion, Slowest, Velocity
 from mav_tasks.tasks.driving.legs import begun_leg
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.task import Progress
@@ -82,7 +80,7 @@ class PathFollower:
     @property
     def _to_correct(self) -> float:
         """Rest of the leg; steered by course, a vehicle cannot drive back from beyond the end."""
-        is_one_way = self.by_course and isinstance(self.leg, Line)
+        is_one_way = self.by_course and self.leg.unit is Unit.METRES
         return max(self.remaining, 0.0) if is_one_way else self.remaining
 
     def metres_to_place(self, motion: Motion) -> float | None:
@@ -108,10 +106,10 @@ class PathFollower:
 
         ``coast`` is how far the vehicle will roll on, m or rad.
         """
-        leg, remaining = self.leg, self.remaining
+        remaining = self.remaining
         if self.is_passing:
             return False
-        if self.progress.leg == FACE and isinstance(leg, Follow):
+        if self.progress.leg == FACE and self.progress.path:
             return remaining <= TURNED_ROUND
         if isinstance(self.goal, GoTo) and self.progress.leg == WAY:
             if remaining < -BESIDE:
@@ -122,16 +120,23 @@ class PathFollower:
         if not stands and 0.0 <= remaining <= coast:
             return True
         within = 1.0 if stands else MOVING_TOLERANCE
-        return guidance.has_arrived(leg, remaining, within=within, driving=driving)
+        return self.leg.is_within(
+            remaining,
+            metres=within * driving.arrival_distance,
+            angle=within * driving.arrival_angle,
+        )
 
     def is_settled(self, *, driving: Driving) -> bool:
         """Return whether the end is near enough for a rover that can come no nearer.
 
         A wider limit holds for a car that is steered by course: it has one try only.
         """
-        if self.has_one_try:
-            driving = replace(driving, settle_distance=ONE_TRY * driving.settle_distance)
-        return guidance.is_settled(self.leg, self._to_correct, driving=driving)
+        metres = driving.settle_distance * (ONE_TRY if self.has_one_try else 1.0)
+        return self.leg.is_within(
+            self._to_correct,
+            metres=max(metres, driving.arrival_distance),
+            angle=max(driving.settle_angle, driving.arrival_angle),
+        )
 
     def advance(self, motion: Motion) -> bool:
         """Begin the next leg where the vehicle stands. Return False if there is none.
@@ -167,36 +172,22 @@ class PathFollower:
     ) -> Velocity:
         """Return the velocity towards the leg's end; ``speed`` in m/s overrides the leg's own."""
         leg, remaining = self.leg, self.remaining
-        if speed is not None and isinstance(leg, Line):
-            leg = replace(leg, speed=speed)
-        elif speed is not None and isinstance(leg, Head):
-            leg = replace(leg, forward=copysign(speed, leg.forward) if leg.forward else 0.0)
+        if speed is not None:
+            leg = leg.at_speed(speed)
         passing = self.passing if self.is_passing else 0.0
         if passing and remaining > 0:
             remaining = max(remaining - self.within, 0.0)
-        if isinstance(leg, Follow):
-            assert self.steering is not None, "a path is driven with a turning circle"
-            return guidance.steer_along(
-                leg,
+        return leg.steer(
+            Situation(
                 self.anchor,
                 motion,
-                along=self.progress.done,
-                remaining=remaining,
-                driving=driving,
-                radius=self.steering.radius,
-                passing=passing,
-                by_course=self.by_course,
-                settles=not self.is_circle,
-                slowest=slowest,
+                self.progress.done,
+                remaining,
+                driving,
+                passing,
+                self.by_course,
+                None if self.steering is None else self.steering.radius,
+                not self.is_circle,
+                slowest,
             )
-        return guidance.steer(
-            leg,
-            self.anchor,
-            motion.pose,
-            remaining=remaining,
-            driving=driving,
-            passing=passing,
-            by_course=self.by_course,
-            radius=None if self.steering is None else self.steering.radius,
-            slowest=slowest,
         )

@@ -6,24 +6,20 @@ would have ended.
 """
 
 from dataclasses import replace
-from math import copysign, inf, pi, radians
+from math import pi, radians
 
-from mav_tasks.kinds import Face, GoTo, LocalPlace, Move, Pose, Rotate, SingleGoal
-from mav_tasks.kinds.base import FACE, WAY
+from mav_tasks.kinds import GoTo, LocalPlace, Pose, SingleGoal
+from mav_tasks.kinds.base import FACE, ON_SPOT, TURNED, WAY, is_turned
+from mav_tasks.kinds.guidance import Motion, bend_speed, corner_speed
 from mav_tasks.kinds.path import (
-    Follow,
     bearing,
     distance,
-    moved,
-    nearest,
     path_length,
     pose_on,
-    seen_from,
     wrap,
 )
 from mav_tasks.settings import Driving, Turning
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.guidance import Motion, bend_speed, corner_speed
 from mav_tasks.tasks.driving.legs import begun_leg
 from mav_tasks.tasks.driving.mission_sequencer import goal_of, goes_on_to_a_place
 from mav_tasks.tasks.driving.path_follower import PathFollower
@@ -37,14 +33,7 @@ ROLLING_TURN = radians(100)
 ROUND = 0.4  # m, radius of the way of what turns on the spot onto a circle
 ROLLING = 0.05  # m/s; a vehicle that is faster goes on to its next place without stopping
 
-ON_SPOT = 0.02  # m; nearer counts as there
-OFF_TRACK = 1.0  # m off its line; farther off, a task does not resume after a takeover (lifecycle)
-PAST_END = 0.1  # m, the same for the end of the line
-CONVERGES = 6.0  # m of line in which steering corrects one metre of cross-track error
-PUT_BACK = 0.3  # m against its direction; no estimate wanders as far in half a minute
-BESIDE_PATH = 0.5  # m off a car's path; steering could not correct much more
-ALIGNED = radians(10)  # rad; a smaller heading error is corrected on the way
-TURNED = radians(30)  # rad; a smaller heading error cannot hide a whole turn
+PUT_BACK = 0.3  # m; no estimate of what stands wanders as far in half a minute
 
 
 def set_out(
@@ -58,7 +47,7 @@ def set_out(
     if progress.anchor is not None and not (is_return and target != progress.target):
         here = resumed(goal, progress, motion, turns_first=turns_first, steering=steering)
     elif not isinstance(goal, GoTo):
-        done = 0.0 if isinstance(goal, Face) else progress.done  # its heading is absolute
+        done = 0.0 if goal.is_absolute else progress.done
         here = replace(fresh, anchor=goal.begun_from(pose, done), leg=0, done=done, path=())
     elif target is None:
         return None
@@ -109,31 +98,17 @@ def is_off_line(task: Task, pose: Pose) -> bool:
     anchor = progress.anchor
     if anchor is None:
         return False
-    leg = goal_of(task).leg_of(progress)
-    match leg:
-        case Follow(path=path):
-            along = nearest(anchor, path, pose, around=progress.done, window=inf)
-            return distance(pose, pose_on(anchor, path, along)) > OFF_TRACK
-        case Move():
-            along, beside = _place_at(leg, anchor, pose)
-            return beside > OFF_TRACK or not -OFF_TRACK <= along <= leg.length + PAST_END
-        case Rotate():
-            return distance(pose, anchor) > OFF_TRACK
-        case _:
-            return False
+    return goal_of(task).leg_of(progress).is_left(anchor, pose, progress.done)
 
 
 def was_handled(task: Task, before: Pose, after: Pose) -> bool:
     """Return whether somebody has moved a vehicle while it was silent.
 
-    On a straight line a vehicle rolls on by itself, but does not turn or come back. Before its task
-    drove it, it stays where it is.
+    Before its task drove it, it stays where it is.
     """
-    has_turned = _is_turned(before, after, TURNED)
     if task.progress.anchor is None:
-        return has_turned or distance(before, after) > PUT_BACK
-    leg = goal_of(task).leg_of(task.progress)
-    return isinstance(leg, Move) and (has_turned or _place_at(leg, before, after)[0] < -PUT_BACK)
+        return is_turned(before, after, TURNED) or distance(before, after) > PUT_BACK
+    return goal_of(task).leg_of(task.progress).was_handled(before, after)
 
 
 def resumed(
@@ -152,16 +127,11 @@ def resumed(
     anchor, pose, target = progress.anchor, motion.pose, progress.target
     if not isinstance(goal, GoTo) or anchor is None or target is None:
         return progress
-    leg, is_near = goal.leg_of(progress), False
-    if isinstance(leg, Follow):  # steering can return to a path by itself, near where it was left
-        there = pose_on(anchor, leg.path, nearest(anchor, leg.path, pose, around=progress.done))
-        is_turned = _is_turned(pose, there, TURNED)
-        is_near = distance(pose, there) <= BESIDE_PATH and not is_turned and steering is not None
-    elif isinstance(leg, Move):
-        along, beside = _place_at(leg, anchor, pose)
-        is_near = beside <= OFF_TRACK and 0 <= along <= leg.length
-    elif progress.leg > WAY:
+    if progress.leg > WAY:
         is_near = distance(pose, target) <= max(goal.radius or 0.0, 2 * ON_SPOT)
+    else:
+        is_car, leg = steering is not None, goal.leg_of(progress)
+        is_near = leg.goes_on_from(anchor, pose, progress.done, is_car=is_car)
     if is_near:
         return progress
     if steering is not None:
@@ -177,35 +147,15 @@ def recovery_path(
     honours_yaw_rate: bool,
     steering: Steering | None = None,
 ) -> PathFollower | None:
-    """Return the way to where the task can resume exactly, or None if that is here.
-
-    A vehicle that is steered by course corrects its heading while it drives on, unless it is a car.
-    """
-    anchor, pose = progress.anchor, motion.pose
+    """Return the way to where the task can resume exactly, or None if that is here."""
+    anchor, by_course, is_car = progress.anchor, not honours_yaw_rate, steering is not None
     assert anchor is not None, "what has begun has an anchor"
-    leg = goal.leg_of(progress)
-    if isinstance(leg, Rotate):
-        there = replace(anchor, yaw=wrap(anchor.yaw + copysign(progress.done, leg.angle)))
-        if distance(pose, there) <= ON_SPOT and not _is_turned(pose, there, TURNED):
-            return None
-        return _way_back(there, pose, by_course=not honours_yaw_rate, steering=None)
-    if not isinstance(leg, Move):
+    there = goal.leg_of(progress).way_back(
+        anchor, motion.pose, progress.done, by_course=by_course, is_car=is_car
+    )
+    if there is None:
         return None
-    along, beside = _place_at(leg, anchor, pose)
-    by_course, is_car, length = not honours_yaw_rate, steering is not None, leg.length
-    at, steers_back = min(max(progress.done, 0.0), length), False
-    if -ON_SPOT <= along <= length + PAST_END and beside <= OFF_TRACK:
-        steers_back = beside <= ON_SPOT or beside * CONVERGES <= length - along
-        at = at if steers_back else min(along, length)
-        if is_car and by_course and along <= leg.distance and not _is_turned(pose, anchor, TURNED):
-            return None  # it would drive a circle
-    if steers_back:
-        if not _is_turned(pose, anchor, ALIGNED) or (by_course and not is_car):
-            return None
-        if not is_car:  # turn here, or it would leave the line
-            return _way_back(replace(pose, yaw=anchor.yaw), pose, by_course=False, steering=None)
-    there = moved(anchor, 0.0, copysign(at, leg.distance))
-    return _way_back(there, pose, by_course=by_course, steering=steering)
+    return _way_back(there, motion.pose, by_course=by_course, steering=steering)
 
 
 def _way_back(
@@ -223,16 +173,6 @@ def _way_back(
             path = way_to_pose(pose, there, replace(steering, fence=None)) or ()
         begun = replace(begun, anchor=pose, path=path)
     return PathFollower(goal, begun, by_course=by_course, steering=steering)
-
-
-def _place_at(line: Move, anchor: Pose, pose: Pose) -> tuple[float, float]:
-    """Return the metres of a pose along the line of a move, and to either side of it."""
-    there = seen_from(anchor, pose)
-    return copysign(1.0, line.distance) * there.real, abs(there.imag)
-
-
-def _is_turned(pose: Pose, other: Pose, most: float) -> bool:
-    return abs(wrap(other.yaw - pose.yaw)) > most
 
 
 def _steering(goal: SingleGoal, seen: VehicleView, bounds: Bounds) -> Steering | None:

@@ -9,12 +9,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import copysign, inf, pi, radians
 
-from mav_tasks.kinds import Move, Pose, Rotate
-from mav_tasks.kinds.path import Follow, beside, cross_track, distance, forward_of, wrap
+from mav_tasks.kinds import Pose, Unit
+from mav_tasks.kinds.base import OFF_TRACK
+from mav_tasks.kinds.guidance import Motion, Velocity, is_far_off
+from mav_tasks.kinds.path import distance, forward_of, wrap
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import Ending, Motion, Velocity, is_far_off
 from mav_tasks.tasks.driving.path_follower import PathFollower
-from mav_tasks.tasks.driving.stage import OFF_TRACK, is_off_line
+from mav_tasks.tasks.driving.stage import is_off_line
 from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.view import VehicleView
 
@@ -106,8 +107,8 @@ class StuckWatch:
         leg, (forward, turned) = course.leg, self._last
         lives = self._lives(seen, has_one_try=course.has_one_try)
         turns = self._turns_by_itself(seen) and not seen.still and self._turned < FULL_TURNS
-        if isinstance(leg, Ending):
-            asked, left = turned if isinstance(leg, Rotate) else forward, abs(course.remaining)
+        if leg.has_end:
+            asked, left = turned if leg.unit is Unit.RADIANS else forward, abs(course.remaining)
             moves = left < self._best_remaining - PROGRESS
             if moves:
                 self._best_remaining, self._turned = left, 0.0
@@ -213,13 +214,11 @@ class AstrayWatch:
     ) -> bool:
         """Return whether it has driven off its line; a corrected position does not count."""
         leg, here, before = course.leg, motion.pose, self._beside
-        if isinstance(leg, Follow):
-            self._beside = abs(beside(course.anchor, leg.path, here, course.progress.done))
-        elif isinstance(leg, Move):
-            self._beside = abs(cross_track(course.anchor, here))
-        else:
+        aside = leg.beside(course.anchor, here, course.progress.done)
+        if aside is None:
             self._least = None
             return False
+        self._beside = aside
         is_turning = self._course is not None and abs(wrap(self._course - here.yaw)) > TURNS
         if self._least is None or last is None or is_turning:
             self._least = self._beside

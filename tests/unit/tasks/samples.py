@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from mav_tasks.kinds import Move, Pose
-from mav_tasks.tasks.driving.guidance import Motion
+from mav_tasks.kinds.guidance import Motion
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms

@@ -7,16 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.kinds import Move, Pose, Rotate, Wait
+from mav_tasks.kinds.guidance import CREEP_SPEED, ZERO, Situation, Velocity
 from mav_tasks.kinds.path import wrap
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import (
-    CREEP_SPEED,
-    ZERO,
-    Velocity,
-    has_arrived,
-    is_settled,
-    steer,
-)
+from tests.unit.tasks.samples import motion
 
 DRIVING = Driving()
 HERE = Pose(0.0, 0.0, 0.0)  # facing north
@@ -27,9 +21,12 @@ poses = st.builds(Pose, lengths, lengths, st.floats(-pi, pi))
 
 
 def steered(goal: Move | Rotate, pose: Pose) -> Velocity:
-    length = abs(goal.distance) if isinstance(goal, Move) else abs(goal.angle)
     done = goal.done_so_far(HERE, pose, before=0.0)
-    return steer(goal, HERE, pose, remaining=length - done, driving=DRIVING)
+    return goal.steer(at(pose, remaining=goal.length - done))
+
+
+def at(pose: Pose, *, remaining: float, anchor: Pose = HERE) -> Situation:
+    return Situation(anchor, motion(pose, at=1.0), 0.0, remaining, DRIVING)
 
 
 def test_a_move_counts_along_its_heading_and_a_rotation_clockwise() -> None:
@@ -70,10 +67,11 @@ def test_the_approach_is_never_faster_than_can_be_braked(
     remaining: float, sign: float, speed: float
 ) -> None:
     goal = Move(sign * 20.0, speed=speed)
-    wish = steer(goal, HERE, HERE, remaining=remaining, driving=DRIVING)
+    now = at(HERE, remaining=remaining)
+    wish = goal.steer(now)
     can_brake = sqrt(2 * DRIVING.acceleration * remaining)
     assert 0 < wish.forward * sign <= max(CREEP_SPEED, min(speed, can_brake))
-    turn = steer(Rotate(sign * 62.0), HERE, HERE, remaining=remaining, driving=DRIVING)
+    turn = Rotate(sign * 62.0).steer(now)
     can_brake = sqrt(2 * DRIVING.turn_acceleration * remaining)
     assert 0 < turn.yaw_rate * sign <= max(0.03, min(DRIVING.turn_rate, can_brake))
 
@@ -86,10 +84,10 @@ def test_it_has_arrived_within_the_tolerance() -> None:
         (Rotate(1.0), radians(0.49), True),
         (Rotate(1.0), radians(-0.51), False),
     ):
-        assert has_arrived(goal, remaining, within=1.0, driving=DRIVING) is arrived
-        assert has_arrived(goal, remaining / 2, within=0.5, driving=DRIVING) is arrived
-    assert not is_settled(Wait(3.0), 0.1, driving=DRIVING)
-    assert steer(Wait(3.0), HERE, HERE, remaining=0.1, driving=DRIVING) == ZERO
+        within = {"metres": DRIVING.arrival_distance, "angle": DRIVING.arrival_angle}
+        assert goal.is_within(remaining, **within) is arrived
+    assert not Wait(3.0).is_within(0.1, metres=1.0, angle=1.0)
+    assert Wait(3.0).steer(at(HERE, remaining=0.1)) == ZERO
 
 
 @given(
@@ -102,6 +100,6 @@ def test_it_has_arrived_within_the_tolerance() -> None:
 def test_no_pose_makes_anything_but_bounded_numbers(
     goal: Move | Rotate, anchor: Pose, pose: Pose, remaining: float
 ) -> None:
-    wish = steer(goal, anchor, pose, remaining=remaining, driving=DRIVING)
+    wish = goal.steer(at(pose, remaining=remaining, anchor=anchor))
     assert abs(wish.forward) <= DRIVING.max_speed
     assert abs(wish.yaw_rate) <= DRIVING.max_turn_rate

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.kinds.guidance import ZERO, Velocity
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.bounds import limited, safe_braking
-from mav_tasks.tasks.driving.guidance import ZERO, Velocity
 
 DRIVING = Driving(acceleration=0.5, turn_acceleration=2.0, max_speed=2.0, max_turn_rate=1.5)
 TICK = 0.05  # s

@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.kinds import Bend, GlobalPlace, GoTo, LocalPlace, Pose
+from mav_tasks.kinds.follow import Follow
+from mav_tasks.kinds.guidance import Situation, bend_speed
 from mav_tasks.kinds.path import (
-    Follow,
     Path,
     beside,
     curvature_at,
@@ -21,7 +22,6 @@ from mav_tasks.kinds.path import (
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
 from mav_tasks.tasks.driving.frames import to_global
-from mav_tasks.tasks.driving.guidance import bend_speed, steer_along
 from mav_tasks.tasks.driving.planner import (
     SPARE,
     Steering,
@@ -134,17 +134,8 @@ def test_a_bend_slows_it_down_and_a_straight_before_it_does_not() -> None:
     speeds = []
     for along in (1.0, 12.0):
         seen = motion(pose_on(HERE, path, along), at=1.0, forward=0.5)
-        speeds.append(
-            steer_along(
-                Follow(path, 1.5),
-                HERE,
-                seen,
-                along=along,
-                remaining=18.0 - along,
-                driving=driving,
-                radius=RADIUS,
-                settles=False,
-            ).forward
-        )
+        left = 18.0 - along
+        now = Situation(HERE, seen, along, left, driving, radius=RADIUS, settles=False)
+        speeds.append(Follow(path, 1.5).steer(now).forward)
     assert speeds == [1.5, pytest.approx(bend_speed(0.5, driving))]
     assert curvature_at(path, 99.0) == 0.0

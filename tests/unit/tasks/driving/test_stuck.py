@@ -3,7 +3,7 @@
 from math import pi
 
 from mav_tasks.kinds import Drive, GoTo, LocalPlace, Move, Pose, Rotate, SingleGoal, Wait
-from mav_tasks.tasks.driving.guidance import ZERO, Velocity
+from mav_tasks.kinds.guidance import ZERO, Velocity
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.watches import BLIND, StuckWatch
 from mav_tasks.tasks.task import Progress
