@@ -67,8 +67,9 @@ def main() -> None:
         print("goto", sorted({(ack["result"], ack["result_param2"]) for ack in acks}))
 
         here.attempt(raw.upload_mission, raw_items(home))
-        wait_for(lambda: heard["MISSION_ACK"], "the ack of the mission")
-        mission_id = heard["MISSION_ACK"][-1]["opaque_id"]
+        # a try that failed for loss has an ack of its own, without an id
+        wait_for(lambda: any(ack["opaque_id"] for ack in heard["MISSION_ACK"]), "the mission's ack")
+        mission_id = max(ack["opaque_id"] for ack in heard["MISSION_ACK"])
         wait_for(
             lambda: (
                 heard["MISSION_CURRENT"]
