@@ -82,10 +82,11 @@ class Task:
                     if status is not None and status is not told:
                         told = status
                         yield status
+                    if self.status is not told:
+                        continue  # it changed while the reader was busy
                     if self._followed.is_over:
                         return
-                    if self.status is told:
-                        await self._news()
+                    await self._news()
 
     async def refresh(self) -> TaskStatus:
         """Request and return the status. Raise Refused (NOT_FOUND) if the server lacks the task."""

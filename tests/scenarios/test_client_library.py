@@ -91,6 +91,20 @@ def test_each_submission_is_one_task_over_a_bad_link(
     assert len(world.server.tasks) == count
 
 
+def test_a_busy_reader_of_updates_is_told_the_end_too(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with world.client() as client:
+            task = await client.submit(Move(0.5))
+            seen = []
+            async for status in task.updates():
+                seen.append(status.state)
+                if status.state is S.EXECUTING:
+                    await task.done()
+            assert seen[-2:] == [S.EXECUTING, S.COMPLETED]
+
+    world.run(script())
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_every_handle_learns_its_end_when_the_server_is_killed(
     make_rover_world: MakeRoverWorld, seed: int
