@@ -55,6 +55,7 @@ class Writer:
         self._is_closing = False
         self._must_reopen = False
         self._refused: list[NonceTaken] = []  # of the last batch
+        self._writing = 0  # events of the batch that is being written
         self._reported_at: float | None = None  # None: nothing is wrong
         self._trim_at = time.monotonic()
         self._thread = Thread(target=self._run, name="store", daemon=True)
@@ -76,10 +77,16 @@ class Writer:
         self._waiting.put(events)
 
     def close(self, *, within: float) -> None:
-        """Write the remaining events and end; wait at most ``within`` s and LAST_TRY."""
+        """Write the remaining events and end; wait at most ``within`` s and LAST_TRY.
+
+        What is not written then, or may not be, is told.
+        """
         self._give_up_at = time.monotonic() + within
         self._waiting.put(None)
         self._thread.join(within + LAST_TRY)
+        if self._thread.is_alive() and self._writing:
+            words = f"{self._writing} events or more may be lost: the last try takes too long"
+            self._mail.put(NotKept(f"store {self._name}: {words}"))
 
     def utc(self) -> float:
         """Return the wall clock's time, s since 1970."""
@@ -144,6 +151,7 @@ class Writer:
             format_id=self._database.format_id,
             offset=self._wall_offset(),
         )
+        self._writing = len(events)
         while not self._is_written(batch):
             if self._give_up_at is not None and time.monotonic() > self._give_up_at:
                 words = (
@@ -152,6 +160,7 @@ class Writer:
                 self._mail.put(NotKept(f"store {self._name}: {words}"))
                 return False
             time.sleep(RETRY)
+        self._writing = 0
         self._reported_at = None
         for refused in self._refused:
             self._mail.put(refused)
