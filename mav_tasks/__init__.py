@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from mav_tasks.errors import Refused as Refused
     from mav_tasks.errors import TaskFailed as TaskFailed
     from mav_tasks.errors import UsageError as UsageError
+    from mav_tasks.kinds import Act as Act
     from mav_tasks.kinds import Drive as Drive
     from mav_tasks.kinds import Face as Face
     from mav_tasks.kinds import GlobalPlace as GlobalPlace
@@ -50,7 +51,7 @@ _HOMES = {
     ),
     "mav_tasks.mavlink.signing": "Key",
     "mav_tasks.plan_files": "read_plan write_plan",
-    "mav_tasks.kinds": "Drive Face GlobalPlace GoTo LocalPlace Move Rotate Wait",
+    "mav_tasks.kinds": "Act Drive Face GlobalPlace GoTo LocalPlace Move Rotate Wait",
     "mav_tasks.tasks.lifecycle": "TaskReason TaskState",
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}

@@ -400,7 +400,7 @@ class Signing:
 #: roles of clients, from the least rights to the most
 ROLES = ("observer", "submitter", "operator", "safety")
 #: kinds of tasks, as limits name them
-TASK_KINDS = ("move", "rotate", "drive", "goto", "return", "wait", "plan")
+TASK_KINDS = ("move", "rotate", "drive", "goto", "return", "wait", "act", "plan")
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 #: what takes part in each packet, each step of a task and each set-point
-COMPILED = ("mavlink", "services", "tasks", "engine")
+COMPILED = ("mavlink", "services", "kinds/guidance.py", "kinds/path.py", "tasks", "engine")
 #: the store and the records read the annotations of these classes, which mypyc does not keep
 STORED = tuple(f"tasks/{name}.py" for name in ("task", "timing", "goal", "events"))
 #: generated, and built when they are first needed: nothing to gain

@@ -1,8 +1,9 @@
 """``mav-tasks submit``: submit a goal as a task."""
 
 from collections.abc import Sequence
+from inspect import Parameter, Signature
 from math import radians
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,66 +19,34 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json
 from mav_tasks.client.wire import Goal
-from mav_tasks.errors import ClientError
-from mav_tasks.kinds import Drive, Face, GoTo, Move, Rotate, Wait
+from mav_tasks.errors import ClientError, SettingError
+from mav_tasks.kinds import GoTo
+from mav_tasks.kinds.form import Form
+from mav_tasks.kinds.in_json import FORMS, GOTO, GOTO_GLOBAL, made_of
+from mav_tasks.setting_keys.parts import Part
 
 EPILOG = """\b
 Examples:
   mav-tasks submit move 2 --speed 0.5 --priority 8 --wait
   mav-tasks submit rotate -90 --after 12
-  mav-tasks submit goto 47.3977 8.5456 --global --at 14:30"""
+  mav-tasks submit goto 47.3977 8.5456 --global --at 14:30
+  mav-tasks submit act relay-on --param1 2"""
 
 Speed = Annotated[
     float | None, typer.Option(metavar="M/S", help="Speed; default: driving.speed of the server.")
 ]
-Rate = Annotated[
-    float | None,
-    typer.Option(metavar="DEG/S", help="Turn rate; default: driving.turn_rate_deg of the server."),
-]
-
 app = group("Submit a task.", epilog=EPILOG)
 
 
-@app.command(cls=NumbersCommand, context_settings=NUMBERS)
-@command
-async def move(
-    distance: Annotated[
-        float, typer.Argument(metavar="METRES", help="Distance; negative: backwards.")
-    ],
-    terms: TaskOptions,
-    common: AnyCommon,
-    speed: Speed = None,
-) -> None:
-    """Drive straight along the heading."""
-    await _submit([Move(distance, speed)], terms, common)
-
-
-@app.command(cls=NumbersCommand, context_settings=NUMBERS)
-@command
-async def rotate(
-    angle: Annotated[float, typer.Argument(metavar="DEGREES", help="Angle; positive: clockwise.")],
-    terms: TaskOptions,
-    common: AnyCommon,
-    rate: Rate = None,
-) -> None:
-    """Turn on the spot by an angle."""
-    await _submit([Rotate(radians(angle), _maybe_radians(rate))], terms, common)
-
-
-@app.command(cls=NumbersCommand, context_settings=NUMBERS)
-@command
-async def drive(
-    forward: Annotated[float, typer.Argument(metavar="M/S", help="Speed; negative: backwards.")],
-    yaw_rate: Annotated[
-        float, typer.Argument(metavar="DEG/S", help="Yaw rate; positive: clockwise.")
-    ],
-    duration: Annotated[str, typer.Argument(metavar="DURATION", help="How long, for example 5s.")],
-    terms: TaskOptions,
-    common: AnyCommon,
-) -> None:
-    """Drive at a constant velocity for some time."""
-    seconds = parse_duration("DURATION", duration)
-    await _submit([Drive(forward, radians(yaw_rate), seconds)], terms, common)
+#: metavars of values by their unit
+METAVARS = {
+    "m": "METRES",
+    "m/s": "M/S",
+    "deg": "DEGREES",
+    "deg/s": "DEG/S",
+    "s": "DURATION",
+}
+SECONDS = "s"
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -116,38 +85,53 @@ async def goto(
     await _submit([way], terms, common)
 
 
-@app.command(cls=NumbersCommand, context_settings=NUMBERS)
-@command
-async def face(
-    heading: Annotated[
-        float, typer.Argument(metavar="DEGREES", help="Heading, clockwise from north.")
-    ],
-    terms: TaskOptions,
-    common: AnyCommon,
-    rate: Rate = None,
-) -> None:
-    """Turn on the spot to a heading."""
-    await _submit([Face(radians(heading), rate=_maybe_radians(rate))], terms, common)
+def _add(form: Form) -> None:
+    """Add the command of a kind: its required parts are arguments, the others options."""
+
+    async def submit(terms: TaskOptions, common: AnyCommon, **given: str | None) -> None:
+        pairs = ((part, given[part.name]) for part in form.numbers)
+        parts = {part.name: _read(part, text) for part, text in pairs if text is not None}
+        await _submit(made_of(form, parts), terms, common)
+
+    shared = [Parameter(n, Parameter.KEYWORD_ONLY, annotation=a) for n, a in SHARED.items()]
+    submit.__signature__ = Signature([*map(_parameter, form.numbers), *shared])  # type: ignore[attr-defined]
+    submit.__doc__ = form.meaning
+    add = app.command(form.name.replace("_", "-"), cls=NumbersCommand, context_settings=NUMBERS)
+    add(command(submit))
 
 
-@app.command(cls=NumbersCommand, context_settings=NUMBERS)
-@command
-async def wait(
-    duration: Annotated[
-        str, typer.Argument(metavar="DURATION", help="How long, for example 30s or 5m.")
-    ],
-    terms: TaskOptions,
-    common: AnyCommon,
-) -> None:
-    """Stand still for some time."""
-    await _submit([Wait(parse_duration("DURATION", duration))], terms, common)
+SHARED = {"terms": TaskOptions, "common": AnyCommon}
 
 
-@app.command()
-@command
-async def home(terms: TaskOptions, common: Common, speed: Speed = None) -> None:
-    """Return to the rover's home."""
-    await _submit([GoTo(None, speed=speed)], terms, common)
+def _parameter(part: Part) -> Parameter:
+    """Return the argument or option of a part, whose value is a text."""
+    words = part.meaning[:1].upper() + part.meaning[1:]
+    for_example = ", for example 30s or 5m" if part.shape.unit == SECONDS else ""
+    more: dict[str, Any] = {"metavar": _metavar(part), "help": f"{words}{for_example}."}
+    if part.is_required:
+        kind, default = Annotated[str, typer.Argument(**more)], Parameter.empty
+    else:
+        option = typer.Option(f"--{part.name.replace('_', '-')}", **more)
+        kind, default = Annotated[str | None, option], None
+    return Parameter(part.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+
+
+def _metavar(part: Part) -> str:
+    return METAVARS.get(part.shape.unit, part.name.upper())
+
+
+def _read(part: Part, text: str) -> object:
+    """Return the plain value of a text; one that cannot be parsed is for the part to refuse."""
+    if part.shape.unit == SECONDS:
+        return parse_duration(_metavar(part), text)
+    try:
+        return part.shape.read(text)
+    except SettingError:
+        return text
+
+
+for each in (form for form in FORMS if form not in (GOTO, GOTO_GLOBAL)):  # one command for both
+    _add(each)
 
 
 async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
-from mav_tasks.kinds import Drive, Face, GoTo, Move, Rotate, Wait
+from mav_tasks.kinds import Act, Drive, Face, GoTo, Move, Rotate, Wait
 from mav_tasks.kinds.sent import LARGEST, check_numbers, check_size
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -21,7 +21,7 @@ from mav_tasks.tasks.repetition import canonical
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_TASK_ID
 
 #: the goals that a client can submit; angles in radians
-Goal = Move | Rotate | Drive | GoTo | Face | Wait
+Goal = Move | Rotate | Drive | GoTo | Face | Wait | Act
 
 #: the address of the task server itself, where it takes tasks for any of its rovers
 SERVER = Address(250, 191)
@@ -84,7 +84,7 @@ def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
             raise ValueError(f"{goal!r}: expected a goal, such as Move(2.0)")
         check_numbers(goal)
     return tuple(
-        Item(i.frame, i.command, 0, 1, *i[1:5], i.x, i.y, 0.0) for goal in goals for i in goal.sent
+        Item(i.frame, i.command, 0, 1, *i[1:5], i.x, i.y, i.z) for goal in goals for i in goal.sent
     )
 
 

@@ -489,6 +489,8 @@ class Engine:
                 deliver(self._gcs, self._submissions, vehicle, answers.pop(0), now=now)
             if unperformed:
                 self._reports.tell_unperformed(vehicle, now=now)
+            if vehicle.requests.acted:
+                self._reports.tell_acted(vehicle, now=now)
         if self._stop_by < inf:
             self._note_stopped(now=now)
         while signatures.refused:

@@ -165,6 +165,10 @@ class Base:
         """How much is done when it begins or resumes, of which ``done`` was before."""
         return done
 
+    def released(self, done: float) -> float:
+        """How much is done of what a person lets go on after an interruption of unknown outcome."""
+        return done
+
     def end_of(self, progress: Begun) -> Spot | None:  # noqa: ARG002
         """Where it ends, if that is known."""
         return None

@@ -4,13 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mav_tasks.errors import SettingError
-from mav_tasks.kinds import drive, goto, move, rotate, wait
+from mav_tasks.kinds import act, drive, goto, move, rotate, wait
+from mav_tasks.kinds.form import Form
 from mav_tasks.setting_keys.parts import read_all, shortened
 
 ROTATE, FACE = rotate.FORMS
 GOTO, GOTO_GLOBAL, HOME = goto.FORMS
 #: in the order in which they are offered
-FORMS = (move.FORM, ROTATE, drive.FORM, GOTO, GOTO_GLOBAL, FACE, wait.FORM, HOME)
+FORMS = (move.FORM, ROTATE, drive.FORM, GOTO, GOTO_GLOBAL, FACE, wait.FORM, act.FORM, HOME)
 BY_NAME = {form.name: form for form in FORMS}
 
 
@@ -21,15 +22,24 @@ def goal_schema() -> dict[str, Any]:
 
 def goals_of(values: Sequence[object]) -> list[Any]:
     """Return the goals of a request. Raise SettingError that names the part that is invalid."""
-    return [_goal_of(value, f"goals[{at}]") for at, value in enumerate(values)]
+    return [goal for at, value in enumerate(values) for goal in _goals_of(value, f"goals[{at}]")]
 
 
-def _goal_of(value: object, name: str) -> Any:
+def _goals_of(value: object, name: str) -> tuple[Any, ...]:
     if not isinstance(value, Mapping):
         raise SettingError(f"{name}: expected an object, such as {{'kind': 'move', 'distance': 2}}")
     form = BY_NAME.get(value["kind"]) if isinstance(value.get("kind"), str) else None
     if form is None:
         words = f"expected one of {', '.join(BY_NAME)}"
         raise SettingError(f"{name}.kind {shortened(value.get('kind'))}: {words}")
-    numbers = {part: number for part, number in value.items() if part != "kind"}
-    return form.make(**read_all(form.numbers, numbers, f"{name}."))
+    parts = {part: number for part, number in value.items() if part != "kind"}
+    return made_of(form, parts, f"{name}.")
+
+
+def made_of(form: Form, parts: Mapping[str, object], within: str = "") -> tuple[Any, ...]:
+    """Return the goals of a kind with these parts.
+
+    Raise SettingError that names the part, ``within`` the object so named, that is invalid.
+    """
+    made = form.make(**read_all(form.numbers, parts, within))
+    return made if isinstance(made, tuple) else (made,)

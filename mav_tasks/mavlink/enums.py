@@ -63,6 +63,7 @@ class MavCmd(IntEnum):
     TASK_MODIFY = 54012
     TASK_RELEASE = 54013
     TASK_OPTIONS = 54014
+    TASK_ACT = 54015
 
 
 class MavFrame(IntEnum):

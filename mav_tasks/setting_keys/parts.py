@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mav_tasks.errors import SettingError
-from mav_tasks.setting_keys.shapes import Choice, Flag, Items, Number, Record, Text
+from mav_tasks.setting_keys.shapes import Choice, Flag, Items, Name, Number, Record, Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class Part:
     """One part; ``meaning`` is for people, without the unit, which the shape has."""
 
     name: str
-    shape: Number | Choice | Flag | Text | Items | Record
+    shape: Number | Choice | Name | Flag | Text | Items | Record
     meaning: str
     is_required: bool = False
 

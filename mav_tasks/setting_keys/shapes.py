@@ -144,6 +144,36 @@ class Choice(_AsWritten):
 
 
 @dataclass(frozen=True, slots=True)
+class Name(_AsWritten):
+    """One of several words, or a whole number from 0 to ``most``."""
+
+    words: tuple[str, ...]
+    most: int
+    unit: str = ""
+
+    @property
+    def valid(self) -> str:
+        return f"{', '.join(self.words)}, or a number from 0 to {self.most}"
+
+    def schema(self) -> dict[str, Any]:
+        """Return the JSON schema of a word or number."""
+        number = {"type": "integer", "minimum": 0, "maximum": self.most}
+        return {"anyOf": [{"type": "string", "enum": list(self.words)}, number]}
+
+    def kept(self, plain: object) -> str | int:
+        """Return the word or number; raise SettingError for another value."""
+        if isinstance(plain, str) and plain in self.words:
+            return plain
+        if type(plain) is int and 0 <= plain <= self.most:
+            return plain
+        raise SettingError(f"expected {self.valid}")
+
+    def read(self, text: str) -> object:
+        """Parse a number; return a word for ``kept`` to look up."""
+        return int(text) if text.isascii() and text.isdecimal() else text
+
+
+@dataclass(frozen=True, slots=True)
 class Flag(_AsWritten):
     unit: str = ""
     valid: str = "true | false"

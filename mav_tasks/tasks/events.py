@@ -133,6 +133,20 @@ class StepReached(_OfVehicle):
 
 
 @dataclass(frozen=True, slots=True)
+class ActTold(_OfVehicle):
+    """The command of an act, a step of a plan, is sent to the vehicle now."""
+
+    task_id: TaskId
+    vehicle: int
+    step: int
+    at: float
+    item: int = 0  # its number in the plan's file, from 1; 0: home
+
+    def _text(self) -> str:
+        return f"task {self.task_id}: item {self.item} sent"
+
+
+@dataclass(frozen=True, slots=True)
 class PlanStored(_OfVehicle):
     """A vehicle's mission (``kind`` 0), fence (1) or rally points (2) were replaced or cleared.
 
@@ -459,6 +473,7 @@ Event = (
     | TaskAdvanced
     | TaskProgressed
     | StepReached
+    | ActTold
     | PlanStored
     | TaskModified
     | TaskAssigned

@@ -90,6 +90,8 @@ class TaskReason(IntEnum):
     REPLACED = 79
     STOP = 80
     SKIPPED = 81
+    REFUSED = 82
+    NO_ANSWER = 83
     # refused
     QUEUE_FULL = 100
     QUOTA = 101
@@ -133,6 +135,8 @@ _WORDS = {
     TaskReason.FRAME_RESET: "position reference changed",
     TaskReason.STOP_UNCONFIRMED: "standstill not confirmed",
     TaskReason.REPLACED: "replaced by a newer task",
+    TaskReason.REFUSED: "the rover refused the command",
+    TaskReason.NO_ANSWER: "no answer to the command, which may have been done",
     TaskReason.STOP: "STOP",
 }
 

@@ -13,6 +13,7 @@ from typing import cast
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.events import (
     SERVER,
+    ActTold,
     Event,
     StepReached,
     TaskAdvanced,
@@ -251,6 +252,16 @@ class TaskRegistry:
         task = self._tasks[task_id]
         item = _item_number(task, step)
         self.record(StepReached(task_id, task.vehicle, step, performs, now, item))
+
+    def will_act(self, task_id: TaskId, progress: Progress, *, now: float) -> None:
+        """Record that an act is about to be told; it is when this is durable."""
+        self.advance(task_id, progress, now=now)
+        self._last_event[task_id] = self.recorded
+
+    def acts(self, task_id: TaskId, step: int, *, now: float) -> None:
+        """Record that an act is told to the vehicle now."""
+        task = self._tasks[task_id]
+        self.record(ActTold(task_id, task.vehicle, step, now, _item_number(task, step)))
 
     def note_progress(self, task_id: TaskId, progress: Progress) -> None:
         """Set live progress, for status only: no event, no new version."""

@@ -55,6 +55,7 @@ def operations(services: Services) -> list[Operation]:
                             "required": number.is_required,
                             "least": number.schema.get("minimum"),
                             "most": number.schema.get("maximum"),
+                            "words": list(getattr(number.shape, "words", ())),
                         }
                         for number in kind.numbers
                     ],

@@ -133,6 +133,7 @@ KIND = whole(
                     "required": FLAG,
                     "least": MAYBE,
                     "most": MAYBE,
+                    "words": listed(TEXT),
                 }
             )
         ),

@@ -11,6 +11,7 @@ from rover_sim.commands import (
 from rover_sim.home_command import HomeCommand
 from rover_sim.message_commands import MessageCommands
 from rover_sim.modes import Mode
+from rover_sim.outputs import ardupilot_outputs
 from rover_sim.setpoints import GLOBAL_FRAMES, read_place
 
 FORCE_ARM = 2989.0  # param2 of COMPONENT_ARM_DISARM, ArduPilot's magic numbers
@@ -32,6 +33,7 @@ def ardupilot_commands(parts: CommandParts) -> CommandTable:
     return CommandTable(
         actions={
             **asking.actions(),
+            **ardupilot_outputs(parts.outbox),
             **HomeCommand(parts, MavResult.FAILED, nowhere_is_here=True).actions(),
             MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
             MavCmd.DO_SET_MODE: commands.do_set_mode,

@@ -33,7 +33,8 @@ class Command(NamedTuple):
     altitude: float = 0.0  # param7, z of COMMAND_INT
 
 
-Action = Callable[[Command, float], MavResult]
+#: a result of None has no answer
+Action = Callable[[Command, float], MavResult | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +95,8 @@ class CommandReceiver:
     def _answer(self, number: int, command: Command, sender: Address, now: float) -> None:
         action = self._table.actions.get(number)
         result = action(command, now) if action else MavResult.UNSUPPORTED
-        self._ack(number, result, sender, now)
+        if result is not None:
+            self._ack(number, result, sender, now)
 
     def _ack(self, command: int, result: MavResult, sender: Address, now: float) -> None:
         ack = messages.CommandAck(command, result, 0, 0, *sender)

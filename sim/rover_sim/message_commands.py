@@ -44,7 +44,7 @@ class MessageCommands:
         self.parts.outbox.send(messages.MessageInterval(message_id & 0xFFFF, interval_us))
         return MavResult.ACCEPTED
 
-    def _request_message(self, command: Command, now: float) -> MavResult:
+    def _request_message(self, command: Command, now: float) -> MavResult | None:
         message_id = as_id(command.params[0])
         action = self.by_index.get(message_id)
         return action(command, now) if action else self._send(message_id, now)

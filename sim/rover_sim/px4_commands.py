@@ -16,6 +16,7 @@ from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7
 from rover_sim.home_command import HomeCommand
 from rover_sim.message_commands import MessageCommands
 from rover_sim.modes import Mode
+from rover_sim.outputs import px4_outputs
 from rover_sim.setpoints import Destination
 
 DO_SET_STANDARD_MODE = 262  # MAV_CMD
@@ -43,6 +44,7 @@ def px4_commands(parts: CommandParts) -> CommandTable:
     return CommandTable(
         actions={
             **asking.actions(),
+            **px4_outputs(),
             **HomeCommand(parts, MavResult.DENIED, nowhere_is_here=False).actions(),
             MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
             MavCmd.DO_SET_MODE: commands.do_set_mode,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mav_tasks import Drive, Face, GoTo, LocalPlace, Move, Rotate, SyncClient, Wait
+from mav_tasks import Act, Drive, Face, GoTo, LocalPlace, Move, Rotate, SyncClient, Wait
 from mav_tasks.plan_files import GeoPoint, PlanFile
 from mav_tasks.settings import Driving, Settings
 from rover_sim.testing.rover_world import RoverWorld
@@ -20,9 +20,19 @@ moves = st.builds(
     Move, st.floats(0.01, 90.0) | st.floats(-90.0, -0.01), st.none() | st.floats(0.02, 1.9)
 )
 rotations = st.builds(Rotate, st.floats(0.01, 60.0) | st.floats(-60.0, -0.01), rates)
-drives = st.builds(Drive, st.floats(0.1, 1.9), st.floats(-1.5, 1.5), st.floats(0.1, 300.0))
+turns = st.floats(-1.5, 1.5).filter(lambda rate: rate == 0 or abs(rate) > 1e-9)
+drives = st.builds(Drive, st.floats(0.1, 1.9), turns, st.floats(0.1, 300.0))
 faces = st.builds(Face, st.floats(0.0, 2 * pi - 0.001), st.sampled_from((-1, 0, 1)), rates)
 waits = st.builds(Wait, st.floats(0.1, 80_000.0))
+singles = st.floats(-1e6, 1e6, width=32)
+integers = st.integers(-10_000, 10_000).map(float)
+acts = st.builds(
+    Act,
+    st.sampled_from((181, 183, 203, 2000)),
+    st.tuples(*[singles] * 4, integers, integers, singles),
+    st.integers(1, 255),
+    st.floats(1.0, 600.0),
+)
 places = st.builds(
     GoTo,
     st.builds(LocalPlace, st.floats(-90.0, 90.0), st.floats(-90.0, 90.0)),
@@ -61,7 +71,7 @@ def client(world: RoverWorld) -> Iterator[SyncClient]:
 def test_each_goal_arrives_as_it_was_asked_for(world: RoverWorld, client: SyncClient) -> None:
     @settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(
-        moves | rotations | drives | faces | waits | places,
+        moves | rotations | drives | faces | waits | places | acts,
         st.integers(0, 10),
         st.floats(1.0, 1e4),
         st.booleans(),
@@ -71,8 +81,8 @@ def test_each_goal_arrives_as_it_was_asked_for(world: RoverWorld, client: SyncCl
         now = world.now
         task = client.submit(asked, priority=priority, delay=delay, deadline=delay + 60)
         found: Any = world.server.task(task.id)
-        kept = getattr(found.goal, "steps", (found.goal,))  # some goals are always a plan
-        assert_close(goal, kept[0])
+        kept: Any = getattr(found.goal, "steps", (found.goal,))  # some goals are always a plan
+        assert_close(goal, kept[1] if isinstance(goal, Act) else kept[0])
         assert None not in kept
         assert found.terms.priority == priority
         assert found.terms.start_at == pytest.approx(now + delay, rel=1e-5, abs=3.0)

@@ -63,6 +63,7 @@ def test_the_tree_of_errors_is_the_one_in_its_docstring() -> None:
 
 def test_what_a_script_may_import_is_there_and_no_more() -> None:
     assert mav_tasks.__all__ == [
+        "Act",
         "Client",
         "ClientError",
         "Drive",

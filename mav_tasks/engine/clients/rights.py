@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.errors import Rejection
-from mav_tasks.kinds import SingleGoal
+from mav_tasks.kinds import Act, SingleGoal
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import ROLES, Limits, Roles
 from mav_tasks.tasks.driving.estimate import MOST_STEPS, Known, time_left
@@ -107,7 +107,7 @@ class Rights(NamedTuple):
             if kind not in limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
         if isinstance(goal, Plan):
-            roles = {step.role for step in goal.steps if isinstance(step, Perform)}
+            roles = {step.role for step in goal.steps if isinstance(step, Perform | Act)}
             for role in (OPERATOR, SAFETY):
                 if role in roles:
                     words = "" if role == OPERATOR else f" for {role}"

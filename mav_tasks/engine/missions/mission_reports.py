@@ -11,12 +11,15 @@ from mav_tasks.engine.missions.plan_items import performed
 from mav_tasks.engine.missions.transfer import MissionParts
 from mav_tasks.engine.timers import Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.kinds import Act
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.missions import item_at
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import (
+    ActTold,
     Event,
     PlanStored,
     StepReached,
@@ -73,6 +76,8 @@ class MissionReports:
                 case StepReached():
                     self._reached(event, now=now)
                     changed.add(event.vehicle)
+                case ActTold():
+                    self._act(event, now=now)
                 case PlanStored():
                     changed.add(event.vehicle)
                 case TaskChanged() | TaskAdvanced():
@@ -109,6 +114,31 @@ class MissionReports:
             item = item_at(task.goal.source, event.step)
             vehicle.perform(performed(item, Address(vehicle.system_id, AUTOPILOT)), now=now)
 
+    def _act(self, event: ActTold, *, now: float) -> None:
+        vehicle = self._parts.vehicles.get(event.vehicle)
+        task = self._parts.registry.get(event.task_id)
+        if vehicle is not None and task is not None and isinstance(task.goal, Plan):
+            act = task.goal.steps[event.step]
+            assert isinstance(act, Act), "only an act is told"
+            vehicle.act(act, now=now)
+
+    def tell_acted(self, vehicle: Vehicle, *, now: float) -> None:
+        """Let a task that acts know the answer, and record in words one that is no yes."""
+        for answered in vehicle.requests.acted:
+            ack = answered.ack
+            accepted = None if ack is None else ack.result == MavResult.ACCEPTED
+            task = vehicle.tasks.executor.act_answered(accepted=accepted, now=now)
+            if task is None or accepted:
+                continue
+            words = f"did not answer command {answered.command} of task {task.id}"
+            if ack is not None:
+                result = _name_of(ack.result)
+                words = f"refused command {answered.command} of task {task.id}: {result}"
+                said = vehicle.parts.failsafes.said_lately(now=now)
+                words += f", {said}" if said else ""
+            self._parts.registry.record(VehicleNoted(vehicle.system_id, words, now))
+        vehicle.requests.acted.clear()
+
     def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:
         """Record plan commands that the vehicle refused or did not answer; the plan goes on."""
         for answered in vehicle.requests.unperformed:
@@ -129,3 +159,8 @@ class MissionReports:
                 and vehicle.system_id in client.introduced
             ):
                 client.outlet.send(message, source)
+
+
+def _name_of(result: int) -> str:
+    known = result in {each.value for each in MavResult}
+    return MavResult(result).name if known else f"result {result}"

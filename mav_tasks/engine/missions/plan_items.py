@@ -23,6 +23,7 @@ from mav_tasks.engine.commands.goals import (
 from mav_tasks.engine.missions.plan_table import (
     SKIPPED,
     MissionParseOptions,
+    act_of,
     name_of,
     options_of,
     row_of_item,
@@ -38,7 +39,7 @@ from mav_tasks.services.missions import Item, packed, unpacked
 from mav_tasks.tasks.driving.fence import Circle, Fence, Polygon, Zone, check
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import loops_in_vain
-from mav_tasks.tasks.goal import Goal, Jump, Near, Nothing, Plan, Step, number_of
+from mav_tasks.tasks.goal import Goal, Jump, Near, Nothing, Perform, Plan, Step, number_of
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import MAX_NONCE, Terms
 
@@ -198,6 +199,7 @@ def plan_of(
 
 def _resolved(items: Sequence[Item], steps: Sequence[Step]) -> Iterator[Step]:
     """Yield the steps with what only the whole plan says: where a tag is, the place before."""
+    acts = [item.command == MavCmd.TASK_ACT for item in items]
     tags = [item.param1 if item.command == TAG else None for item in items]
     places = [step.place if isinstance(step, GoTo) else None for step in steps]
     for seq, (item, step) in enumerate(zip(items, steps, strict=True)):
@@ -210,6 +212,11 @@ def _resolved(items: Sequence[Item], steps: Sequence[Step]) -> Iterator[Step]:
         elif isinstance(step, GoTo) and step.turns and not step.place:
             before = [place for place in places[:seq] if place]
             yield replace(step, place=before[-1]) if before else Nothing()
+        elif acts[seq] and not isinstance([*steps[seq + 1 :], None][0], Perform):
+            words = f"item {seq + 1}: TASK_ACT is about the next item, which is sent to no rover"
+            raise Rejection(R.BAD_PARAMETER, words)
+        elif seq and acts[seq - 1]:
+            yield act_of(_command_of(items[seq - 1]), _command_of(item))
         else:
             yield step
 

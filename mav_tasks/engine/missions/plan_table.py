@@ -25,10 +25,12 @@ from mav_tasks.engine.commands.goals import (
 )
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.errors import Rejection
-from mav_tasks.kinds import GoTo, Place, Wait
+from mav_tasks.kinds import Act, GoTo, Place, Wait
+from mav_tasks.kinds.act import LONGEST, TIME_LIMIT
 from mav_tasks.kinds.base import Ability
+from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
-from mav_tasks.services.commands import Command
+from mav_tasks.services.commands import NO_MESSAGE, Command
 from mav_tasks.services.missions import NOT_GIVEN
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
@@ -40,6 +42,7 @@ R = TaskReason
 
 FOR_EVER = 1e9  # s; JSON has no infinity
 MAX_JUMPS = 65_535
+MAX_COMPONENT = 255
 MOST_TURNS = 255  # as ArduPilot stores
 LEAST_CIRCLE = 0.9  # m, radius; ArduPilot's TURN_RADIUS
 NO_CHANGE, DEFAULT = (0.0, -1.0), -2.0  # DO_CHANGE_SPEED, param2
@@ -151,6 +154,8 @@ def step_of_command(command: Command, count: int, how: MissionParseOptions) -> S
             return goal_of(command, driving)
         case 54014:
             options_of(command, now=0.0)  # only to check them
+        case 54015:
+            act_of(command, Command(command.target, 0, (0.0,) * 7, 0, None, NO_MESSAGE))
     return Nothing()
 
 
@@ -168,6 +173,24 @@ def options_of(command: Command, *, now: float) -> Terms:
         after=identifier(command, 4, "run after"),
         start_at=now + delay if delay else None,
         deadline=now + deadline if deadline else None,
+    )
+
+
+def act_of(whom: Command, what: Command) -> Act:
+    """Return the act of a TASK_ACT and the command after it.
+
+    Raise Rejection that names a bad parameter.
+    """
+    component = whole(whom, 1, "component", high=MAX_COMPONENT)
+    limit = number(whom, 2, "time limit", low=0.0, high=LONGEST, default=0.0)
+    params = tuple(0.0 if isnan(value) else value for value in what.params)
+    return Act(
+        what.command,
+        params,
+        component or AUTOPILOT,
+        limit or TIME_LIMIT,
+        MavFrame.MISSION.value if what.frame is None else what.frame,
+        row_of_command(what.command).role,
     )
 
 
@@ -236,6 +259,10 @@ the same; ends the plan if there is no such tag* | refuses the plan
 refuses the plan* | the same*
 
 54000 54001 54002 | drives | as the command; param5 and param6 (after, delay) must be 0 | – | –
+
+54015 | drives | the next item is sent, once, when its turn comes, to component param1 (0: the
+autopilot); the plan waits until it is accepted, and fails if it is refused or has no answer within
+param2 seconds (0: 10) | – | –
 
 54014 | drives | options of the whole plan: param1 priority, param2 start delay s, param3 deadline s
 (both from the end of the upload), param4 run after, param5 (`x`) nonce, param6 (`y`) more bits of

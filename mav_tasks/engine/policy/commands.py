@@ -124,6 +124,7 @@ BY_WORDS = (DISARM, PAUSE, PAUSE_HERE, HOLD, START)
 OURS = {
     **named(SUBMITS, "54000 TASK_MOVE, 54001 TASK_ROTATE, 54002 TASK_DRIVE"),
     **named(replace(SUBMITS, about="options of a plan, only as its item"), "54014 TASK_OPTIONS"),
+    **named(replace(SUBMITS, about="whom the next item of a plan is for"), "54015 TASK_ACT"),
     **named(replace(SUBMITS, about="changes one's own task"), "54012 TASK_MODIFY"),
     54003: handled("TASK_STOP", Kind.HALT, OBSERVER, "STOP, at any component"),
     54010: handled("TASK_CANCEL", Kind.HALT, SUBMITTER, "cancels one's own task"),

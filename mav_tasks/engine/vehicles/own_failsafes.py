@@ -29,6 +29,7 @@ FAILSAFE = re.compile(
     re.IGNORECASE,
 )
 NO_FAILSAFE = re.compile(r"cleared|continuing", re.IGNORECASE)
+A_MOMENT = 1.0  # s between the text of a refusal and the refusal
 JUST_NOW = 3.0  # s between the text of a failsafe and the mode that the failsafe sets
 
 
@@ -48,6 +49,7 @@ class OwnFailsafes:
         self._receiver = TextReceiver()
         self._arming, self._arming_at = "", -inf
         self._failsafe, self._failsafe_at = "", -inf
+        self._said, self._said_at = "", -inf
         self.is_outside_fence = False
         self._changed_at = -inf  # when the mode changed without a known cause
 
@@ -57,6 +59,10 @@ class OwnFailsafes:
     def why_not_ready(self, *, now: float) -> str:
         """Return the vehicle's recent text on why it does not arm, or ""."""
         return self._arming if now - self._arming_at <= LATELY else ""
+
+    def said_lately(self, *, now: float) -> str:
+        """Return the vehicle's last text of a moment ago, or ""."""
+        return self._said if now - self._said_at <= A_MOMENT else ""
 
     def mode_changed(self, *, now: float) -> str:
         """Note a mode change. Return the failsafe that caused it, or "" if none is known yet."""
@@ -73,6 +79,7 @@ class OwnFailsafes:
             *self._receiver.receive(sender, message, now=now),
         ):
             words = text.words.strip()
+            self._said, self._said_at = words, now
             if words.lower().startswith(ARMING):
                 self._arming, self._arming_at = words, now
             elif FAILSAFE.search(words) and not NO_FAILSAFE.search(words):

@@ -7,7 +7,7 @@ done to it. ``commands.forwarding`` decides whether a client's set-points pass.
 from collections import OrderedDict
 from collections.abc import Hashable
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.packets import LeaseWatch, PacketSender
@@ -23,9 +23,10 @@ from mav_tasks.engine.vehicles.shown import ShownHeartbeat
 from mav_tasks.engine.vehicles.takeovers import Takeovers
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
+from mav_tasks.kinds import Act
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.commands import COPIED, DOUBLED, Standing
 from mav_tasks.services.persona import Persona
@@ -38,7 +39,7 @@ from mav_tasks.services.vehicle_status import (
 )
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.halts import LastHalt, Permit
-from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
+from mav_tasks.tasks.lifecycle import RUNNING, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
@@ -398,6 +399,22 @@ class Vehicle:
             immediate=disarms,
             now=now,
         )
+
+    def act(self, act: Act, *, now: float) -> None:
+        """Send the command of an act that is due."""
+        active = self.tasks.active
+        if self.tasks.is_stopped or active is None or active.state is not TaskState.EXECUTING:
+            return  # cancelled in the very step that was to send it
+        params: list[Any] = [*act.params]
+        command: m.CommandLong | m.CommandInt = m.CommandLong(
+            self.system_id, act.component, act.command, 0, *params
+        )
+        if act.frame != MavFrame.MISSION:
+            params[4:6] = map(int, params[4:6])
+            command = m.CommandInt(
+                self.system_id, act.component, act.frame, act.command, 0, 0, *params
+            )
+        self.requests.act(command, give_up_after=act.time_limit, now=now)
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
         """Send a vehicle command that a plan item orders."""

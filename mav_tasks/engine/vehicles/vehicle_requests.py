@@ -10,7 +10,7 @@ from mav_tasks.engine.inputs import Outgoing, Place
 from mav_tasks.engine.packets import PacketSender
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
@@ -63,6 +63,9 @@ class VehicleRequests:
         self._performed: set[int] = set()  # command ids that plans have ordered
         #: the plans' commands refused or not answered; who reports them clears it
         self.unperformed: list[Answered] = []
+        self._act: m.CommandLong | m.CommandInt | None = None  # told, and not answered yet
+        #: the answer to it; who reports it clears it
+        self.acted: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         #: what the vehicle is asked for, how it stops by itself, turns and drives
@@ -98,7 +101,14 @@ class VehicleRequests:
         self.move_to(self._outlet.shut())
 
     def receive(self, ack: m.CommandAck, *, component: int, now: float) -> None:
-        """Process an answer of the vehicle."""
+        """Process an answer of the vehicle.
+
+        ArduPilot's autopilot carries out itself, and answers, what a component is told that it does
+        not know (4.6.3, SITL).
+        """
+        act = self._act
+        if act is not None and (ack.command, component) == (act.command, AUTOPILOT):
+            component = act.target_component
         self._sender.receive(ack, component=component, now=now)
         self.flush(now=now)
 
@@ -153,8 +163,20 @@ class VehicleRequests:
         self._sender.request(command, now=now, give_up_after=self._watch.ask_vehicle)
         self.flush(now=now)
 
+    def act(
+        self, command: m.CommandLong | m.CommandInt, *, give_up_after: float, now: float
+    ) -> None:
+        """Send a command once, because a vehicle carries out each copy."""
+        self._act = command
+        self.is_home_old |= command.command == MavCmd.DO_SET_HOME
+        self._sender.request(command, now=now, give_up_after=give_up_after, repeats=False)
+        self.flush(now=now)
+
     def end_performing(self) -> None:
         """Stop sending what plans have ordered, on STOP or a takeover."""
+        if self._act is not None:
+            self._sender.withdraw(self._act.target_component, self._act.command)
+            self._act = None
         for command in self._performed:
             self._sender.withdraw(self._target.component_id, command)
         self._performed.clear()
@@ -289,6 +311,9 @@ class VehicleRequests:
             self.answers.append(answer)
         elif is_request_of(answer):
             self.control.answered(answer, now=now)
+        elif answer.request is self._act:
+            self._act = None
+            self.acted.append(answer)
         elif answer.command in self._performed:
             if result != MavResult.ACCEPTED:
                 self.unperformed.append(answer)

@@ -7,7 +7,8 @@ from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
-from mav_tasks.kinds import GoTo
+from mav_tasks.kinds import Act, GoTo
+from mav_tasks.kinds.act import ACCEPTED, TOLD
 from mav_tasks.kinds.base import Ability
 from mav_tasks.kinds.guidance import ZERO, Motion
 from mav_tasks.settings import Driving, Settings
@@ -90,6 +91,8 @@ class Drive:
         self._kept_at = 0.0  # when progress was last recorded for the store
         self._kept_as = 0  # the number of that event
         self._driven = 0.0  # m commanded so far for the active task
+        self._told_act = False  # the present act, in this run and by this driver
+        self._act_failed = R.NONE
 
     def __repr__(self) -> str:
         return f"Drive({self._course!r}, {self._last_velocity})"
@@ -106,6 +109,22 @@ class Drive:
         """Set the speed from now on, m/s; None: the task's own."""
         if self._course is not None:
             self._course.progress = replace(self._course.progress, speed=speed)
+
+    def act_answered(self, task: Task, accepted: bool | None, *, now: float) -> bool:
+        """Note the answer to a task's act, None: there was none. Return whether it is acting."""
+        goal, progress = goal_of(task), task.progress
+        if not isinstance(goal, Act) or progress.done != TOLD:
+            return False
+        if accepted:
+            progress = replace(progress, done=ACCEPTED)
+        elif task.state is S.EXECUTING:
+            self._act_failed = R.NO_ANSWER if accepted is None else R.REFUSED
+        elif accepted is not None:  # it is not done: when the task resumes, it is told again
+            progress = replace(progress, done=0.0)
+        if self._course is not None:
+            self._course.progress = replace(self._course.progress, done=progress.done)
+        self._registry.advance(task.id, progress, now=now)
+        return True
 
     def limit(self, demand: Demand, *, elapsed: float, now: float) -> Demand:
         """Return a demand with its velocity limited and ramped from the last one."""
@@ -125,6 +144,8 @@ class Drive:
         """Plan the path of a task that starts or resumes where the vehicle stands."""
         self._driven = task.progress.driven
         self._way_back = None
+        if isinstance(goal_of(task), Act) and task.progress.done == TOLD:
+            raise Becomes(S.HELD, R.OUTCOME_UNKNOWN)
         here = self._set_out(Tick(task, seen, motion, now), task.progress)
         course = self._course
         if course is None:
@@ -250,6 +271,9 @@ class Drive:
         if is_held_back:
             self._stuck.begin(now=now)
             return view.STAND
+        if isinstance(course.leg, Act):
+            self._act(task, course, now=now)
+            return view.STAND
         if self._stuck.is_stuck(course, seen, limit=watch.stuck, now=now):
             raise Becomes(S.FAILED, R.STUCK)
         news = self._follows.look(
@@ -297,7 +321,19 @@ class Drive:
             return driving
         return replace(driving, speed=min(self.cruise, driving.max_speed))
 
+    def _act(self, task: Task, course: PathFollower, *, now: float) -> None:
+        """Tell the vehicle once, when it is durable that it will be told; fail if that failed."""
+        if self._act_failed:
+            raise Becomes(S.FAILED, self._act_failed)
+        if course.progress.done == 0.0:
+            course.progress = replace(course.progress, done=TOLD)
+            self._registry.will_act(task.id, course.progress, now=now)
+        elif not self._told_act:
+            self._told_act = True
+            self._registry.acts(task.id, course.progress.step, now=now)
+
     def _begin_leg(self, *, now: float) -> None:
+        self._told_act, self._act_failed = False, R.NONE
         self._stuck.begin(now=now)
         self._astray.begin_leg()
         self._follows.begin()

@@ -133,7 +133,19 @@ class Executor:
         elif task.reason in (R.FRAME_RESET, R.OFF_TRACK):
             # its line is lost or left for good: keep the distance driven, not the start pose
             progress = replace(progress, anchor=None, frame=None, target=None, path=())
+        elif task.reason is R.OUTCOME_UNKNOWN:
+            progress = replace(progress, done=goal_of(task).released(progress.done))
         self._change(S.STARTING, actor=actor, now=now, progress=progress)
+
+    def act_answered(self, *, accepted: bool | None, now: float) -> Task | None:
+        """Note the vehicle's answer to the active task's act, None: there was none in time.
+
+        Return the task, None if it is not acting.
+        """
+        task = self.task
+        return (
+            task if task is not None and self.drive.act_answered(task, accepted, now=now) else None
+        )
 
     def set_speed(self, speed: float | None) -> None:
         """Set the speed of the active task from now on, m/s; None: the task's own.

@@ -91,7 +91,10 @@ function termsOf(form) {
 function bodyOf(form, kind) {
   const data = new FormData(form);
   const goal = { kind: kind.kind };
-  for (const { name } of kind.numbers) if (numberOf(data, name) !== null) goal[name] = numberOf(data, name);
+  for (const { name } of kind.numbers) {
+    const text = String(data.get(name) ?? "").trim();
+    if (text !== "") goal[name] = Number.isNaN(Number(text)) ? text : Number(text); // the server says which words there are
+  }
   return { goals: [goal], ...termsOf(form) };
 }
 
@@ -99,11 +102,11 @@ function field(number, value) {
   const hint = [number.meaning];
   if (number.least !== null) hint.push(`at least ${number.least}`);
   if (number.most !== null) hint.push(`at most ${number.most}`);
-  const input = h("input", {
-    name: number.name, type: "number", step: "any", required: number.required, value: value ?? "",
-    min: number.least ?? undefined, max: number.most ?? undefined,
-  });
-  return labelled(`${number.name.charAt(0).toUpperCase()}${number.name.slice(1).replace("_", " ")}${number.unit ? ` (${number.unit})` : ""}`, input, hint.join("; "));
+  const list = `words-of-${number.name}`;
+  const kind = number.words.length ? { list, autocomplete: "off" } : { type: "number", step: "any", min: number.least ?? undefined, max: number.most ?? undefined };
+  const input = h("input", { name: number.name, required: number.required, value: value ?? "", ...kind });
+  const words = h("datalist", { id: list }, ...number.words.map((word) => h("option", { value: word })));
+  return labelled(`${number.name.charAt(0).toUpperCase()}${number.name.slice(1).replace("_", " ")}${number.unit ? ` (${number.unit})` : ""}`, number.words.length ? h("span", {}, input, words) : input, hint.join("; "));
 }
 
 function labelled(name, input, hint) {

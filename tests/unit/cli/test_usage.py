@@ -51,6 +51,11 @@ TILES = {"empty": EMPTY, "vector": EMPTY + VECTOR}
 OTHERS = """queue -s pigeon:1: udpout:host:port
 submit move 1 --in 5s --at 14:30: --in and --at
 submit wait -5: DURATION -5
+submit act relay-onn: command 'relay-onn': expected photo, camera-trigger
+submit act 65536: command 65536: expected
+submit act servo --param1 two: param1 'two': not a number
+submit act servo --param5 1.5: param5 1.5: not a whole number
+submit act servo --time-limit 11m: time_limit 660.0: not in 0.1..600 s
 submit move 1 --every 5w: 30s, 5m or 1h30m
 modify 3: --priority
 release perhaps: again, remainder or skip

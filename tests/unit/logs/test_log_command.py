@@ -76,6 +76,7 @@ EVENTS: list[e.Event] = [
     e.VehicleSeen(1, "found", AT),
     e.VehicleNoted(1, "a\x1b[31mb\r\nc\x07\u202ed\x9b é", AT),
     e.ServerStopped((1, 2), AT),
+    e.ActTold(ID, 1, 2, AT, 3),
 ]
 #: what the object of each says besides event, time, level, message and vehicle
 SAID = rf""""task": 17, "actor": "{SOMEBODY}", "state": "queued"
@@ -104,7 +105,8 @@ SAID = rf""""task": 17, "actor": "{SOMEBODY}", "state": "queued"
 "actor": "a signed anna", "seconds": 90.0
 "text": "found"
 "level": "warning"
-"unconfirmed": [1, 2]"""
+"unconfirmed": [1, 2]
+"task": 17, "step": 2, "item": 3"""
 VALUES = [json.loads(f"{{{row}}}") for row in SAID.splitlines()]
 
 #: the first that differ from what their event says of itself

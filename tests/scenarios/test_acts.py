@@ -1,0 +1,142 @@
+"""One command to the rover or its camera, as a task: told once, and done when it is accepted."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import NO_FAULTS, Faults
+from tests.kit.cases import anew, for_each
+from tests.kit.client import ACCEPTED
+from tests.kit.restarts import UTC, restart
+from tests.kit.rows import check, item
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import World, is_at
+from tests.scenarios.conftest import MakeWorld
+
+RELAY, COMMAND_ACK = 181, 77
+RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
+TOLD = "TASK_ACT 1 5; DO_SET_RELAY 0 1 0 0 frame=2"
+UNANSWERED = Faults(withheld=frozenset({COMMAND_ACK}))
+
+
+@anew
+def world(make_world: MakeWorld, path: Path) -> World:
+    return make_world(store=PromptSqliteStore(path, wall_offset=UTC), settings=Settings())
+
+
+def upload(world: World, plan: str) -> int:
+    """Upload a plan to the task server; return its id."""
+    sent = world.upload([item(each) for each in plan.split("; ")], target=(1, 191))
+    assert sent.result == ACCEPTED, world.client.texts()
+    return int(sent.opaque_id)
+
+
+def times_told(world: World) -> int:
+    return world.observer.sent_since(0).count(str(RELAY))
+
+
+def test_it_is_told_once_between_two_drives_while_the_rover_stands(world: World) -> None:
+    seen: list[Any] = []
+
+    def look(_now: float) -> None:
+        if len(seen) < times_told(world):
+            seen.append((world.truth.north, world.truth.forward_speed))
+
+    world.watch(look)
+    task = upload(world, f"NAV_WAYPOINT at=1,0; {TOLD}; NAV_WAYPOINT at=2,0")
+    world.until_state(task, S.COMPLETED)
+    assert seen == [(pytest.approx(1.0, abs=0.1), pytest.approx(0.0, abs=0.02))]
+    assert is_at(world, 2.0, 0.0)
+
+
+@for_each(
+    "faults, plan, reason, words",
+    [
+        (NO_FAULTS, "TASK_ACT; DO_SET_RELAY 9 1 0 0 frame=2", R.REFUSED, "of task 1: FAILED"),
+        (UNANSWERED, TOLD, R.NO_ANSWER, "did not answer command 181 of task 1"),
+        (
+            NO_FAULTS,
+            "TASK_ACT 100; DO_SET_SERVO 1 1700 0 0 frame=2",  # no such component: ArduPilot answers
+            R.REFUSED,
+            "FAILED, ServoRelayEvent: Channel 1 is already in use",
+        ),
+    ],
+)
+def test_it_fails_with_the_rovers_own_result(
+    world: World, faults: Faults, plan: str, reason: R, words: str
+) -> None:
+    world.client.pause()
+    task = upload(world, plan)
+    world.client.proceed()
+    world.until_state(task, S.STARTING)
+    world.until_state(task, S.EXECUTING)
+    world.fault(faults)
+    world.until_state(task, S.FAILED)
+    assert world.state(task) == (S.FAILED, reason)
+    assert words in world.events(VehicleNoted)[-1].text
+    told = [n for n in world.observer.sent_since(0) if n in ("181", "183")]
+    assert len(told) == 1
+
+
+@for_each("how", [AGAIN, REMAINDER, SKIP])
+def test_after_a_crash_it_is_not_told_again_but_held(world: World, path: Path, how: int) -> None:
+    world.fault(UNANSWERED)
+    task = upload(world, TOLD)
+    world.until(lambda: times_told(world) == 1, within=10.0)
+    restart(world, path)
+    world.fault(NO_FAULTS)
+    world.run(5.0)
+    assert world.state(task) == (S.HELD, R.OUTCOME_UNKNOWN)
+    assert times_told(world) == 1
+    sent = world.client.command(RELEASE, task, how)
+    world.client.proceed()
+    world.run(10.0)
+    assert sent.answer == (ACCEPTED, task)
+    assert world.state(task) == ((S.CANCELLED, R.SKIPPED) if how == SKIP else (S.COMPLETED, R.NONE))
+    assert times_told(world) == (1 if how == SKIP else 2)
+
+
+@for_each("answers", [True, False])
+def test_a_pause_before_its_answer_keeps_what_is_known(world: World, *, answers: bool) -> None:
+    world.fault(NO_FAULTS if answers else UNANSWERED)
+    task = upload(world, TOLD)
+    world.until(lambda: times_told(world) == 1, within=10.0)
+    world.client.pause()
+    world.run(8.0)
+    world.fault(NO_FAULTS)
+    world.client.proceed()
+    world.run(5.0)
+    after = (S.COMPLETED, R.NONE) if answers else (S.HELD, R.OUTCOME_UNKNOWN)
+    assert world.state(task) == after
+    assert times_told(world) == 1
+
+
+def test_a_stop_ends_it(world: World) -> None:
+    world.fault(UNANSWERED)
+    task = upload(world, TOLD)
+    world.until(lambda: times_told(world) == 1, within=10.0)
+    world.client.command(54003)
+    world.run(8.0)
+    assert world.state(task) == (S.KILLED, R.STOP)
+    assert times_told(world) == 1
+
+
+def test_what_may_move_the_rover_or_is_no_command_is_refused(world: World) -> None:
+    check(
+        world,
+        """
+plan; TASK_ACT; DO_SET_MODE 1 END : UNSUPPORTED is not for a plan: the server starts, stops and arms
+plan; TASK_ACT; DO_MOTOR_TEST 1 END : UNSUPPORTED never on the way
+plan; TASK_ACT; DO_REPOSITION 1 END : UNSUPPORTED see 16
+plan; TASK_ACT; NAV_WAYPOINT at=1,0 : INVALID TASK_ACT is about the next item
+plan; NAV_WAYPOINT at=1,0; TASK_ACT : INVALID item 2: TASK_ACT is about the next item
+plan; TASK_ACT 256; DO_SET_RELAY 0 1 END : INVALID_PARAM1 component 256 not in 0..255
+plan; TASK_ACT 1 601; DO_SET_RELAY 0 1 END : INVALID_PARAM2 time limit 601 not in 0..600
+plan; TASK_ACT; DO_SET_RELAY 0 1 END; DO_JUMP 0 -1 END : INVALID a loop without motion
+""".replace("END", "0 0 0 frame=2"),
+    )
