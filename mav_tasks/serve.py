@@ -19,6 +19,7 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
 from mav_tasks.key_ring.watch import RingWatch
+from mav_tasks.kinds.in_json import PLUGGED
 from mav_tasks.link_keys import check_keys, in_words
 from mav_tasks.links.base import Link
 from mav_tasks.links.config_check import faults_of, links_of, pushed_to, pushing_url
@@ -136,6 +137,8 @@ def _serve(settings: ServerSettings, reload: Reload) -> int:
             values = sorted(restored.parameters.items())
             told = ", ".join(f"{name} {value:g}" for name, value in values)
             say(f"parameters of an earlier run: {told}")
+        if PLUGGED.broken:
+            say(PLUGGED.broken)
         running = _run(
             settings,
             store,

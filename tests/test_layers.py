@@ -45,7 +45,7 @@ config: errors folders links services setting_keys settings whole_file
 key_ring: config errors folders mavlink setting_keys settings whole_file
 fleet_link: clock engine fleet_io links
 gateway: clock engine errors fleet fleet_io fleet_link settings store
-serve: clock config engine errors gateway key_ring link_keys links logs metrics observer
+serve: clock config engine errors gateway key_ring kinds link_keys links logs metrics observer
     recording runner settings store tasks
 client: errors kinds latest links mavlink plan_files services setting_keys tasks
 crowd:

@@ -7,10 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
+from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Reach
 from mav_tasks.cli.session import signing_key, unfound
 from mav_tasks.errors import UsageError, missing
+from mav_tasks.kinds.in_json import PLUGGED
 
 
 def _gone(name: str) -> Any:
@@ -63,6 +65,7 @@ async def mcp(reach: Reach, options: AgentOptions) -> None:
     from mav_tasks.agents.streamable_http import place_of, serve_http  # noqa: PLC0415
     from mav_tasks.key_ring.limits import limits_in_words  # noqa: PLC0415
 
+    output.warn(PLUGGED.broken)
     place = place_of(options.http) if options.http else None
     key = signing_key(reach)
     signer, limits = ("", "") if key is None else (key.fingerprint, limits_in_words(key.limits))

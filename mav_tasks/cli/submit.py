@@ -22,7 +22,7 @@ from mav_tasks.client.wire import Goal
 from mav_tasks.errors import ClientError, SettingError
 from mav_tasks.kinds import GoTo
 from mav_tasks.kinds.form import Form
-from mav_tasks.kinds.in_json import FORMS, GOTO, GOTO_GLOBAL, made_of
+from mav_tasks.kinds.in_json import FORMS, GOTO, GOTO_GLOBAL, PLUGGED, made_of
 from mav_tasks.setting_keys.parts import Part
 
 EPILOG = """\b
@@ -135,6 +135,7 @@ for each in (form for form in FORMS if form not in (GOTO, GOTO_GLOBAL)):  # one 
 
 
 async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> None:
+    output.warn(PLUGGED.broken)
     wished, heard = read(terms), ChoiceHeard()
     async with opened(common) as client:
         with values_checked(), in_typed_words(), client.listening(heard.listen):

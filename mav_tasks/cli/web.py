@@ -13,6 +13,7 @@ from mav_tasks.errors import UsageError, missing
 from mav_tasks.folders import at_home
 from mav_tasks.key_ring.ring_file import load
 from mav_tasks.key_ring.watch import RingWatch
+from mav_tasks.kinds.in_json import PLUGGED
 
 app = typer.Typer(rich_markup_mode=None)  # without a command it serves
 KEYS = "mav-tasks keys add NAME --role operator prints a token; keys list and revoke manage them"
@@ -89,6 +90,7 @@ def web(
     if is_far and not any(key.secret and key.role for key in ring.keys or ()):
         where = f"--name {name[0]}" if name else f"--listen {listen}"
         raise UsageError(f"{where}: who sits elsewhere needs a token. {KEYS} (ring: {ring.path})")
+    output.warn(PLUGGED.broken)
     old = ring.path.with_name(OLD_TOKENS)
     if old.exists():
         output.warn(f"{old} is not used any more: {KEYS}")

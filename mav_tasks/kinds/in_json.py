@@ -6,12 +6,15 @@ from typing import Any
 from mav_tasks.errors import SettingError
 from mav_tasks.kinds import act, drive, goto, move, rotate, wait
 from mav_tasks.kinds.form import Form
+from mav_tasks.kinds.plugged import plugged
 from mav_tasks.setting_keys.parts import read_all, shortened
 
 ROTATE, FACE = rotate.FORMS
 GOTO, GOTO_GLOBAL, HOME = goto.FORMS
+OWN = (move.FORM, ROTATE, drive.FORM, GOTO, GOTO_GLOBAL, FACE, wait.FORM, act.FORM, HOME)
+PLUGGED = plugged([form.name for form in OWN])
 #: in the order in which they are offered
-FORMS = (move.FORM, ROTATE, drive.FORM, GOTO, GOTO_GLOBAL, FACE, wait.FORM, act.FORM, HOME)
+FORMS = (*OWN, *PLUGGED.forms)
 BY_NAME = {form.name: form for form in FORMS}
 
 
