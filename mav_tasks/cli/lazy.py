@@ -4,7 +4,7 @@ Each call of the command line pays for what it imports; a module of a command ma
 at its top whatever the command always needs. A *home* is "module:name" of a value.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -18,11 +18,11 @@ def loaded(home: str) -> Any:
     return getattr(import_module(module), name)
 
 
-def completing(home: str) -> Callable[[str], list[str]]:
+def completing(home: str | Sequence[str]) -> Callable[[str], list[str]]:
     """Return a completion from words, or from a function that returns words, with this home."""
 
     def complete(incomplete: str) -> list[str]:
-        words = loaded(home)
+        words = loaded(home) if isinstance(home, str) else home
         return beginning_with(incomplete, words() if callable(words) else words)
 
     return complete

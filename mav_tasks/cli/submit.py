@@ -9,7 +9,7 @@ import typer
 
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
-from mav_tasks.cli.lazy import group
+from mav_tasks.cli.lazy import completing, group
 from mav_tasks.cli.options import AnyCommon, Common, TaskOptions
 from mav_tasks.cli.places import parse_place
 from mav_tasks.cli.session import ChoiceHeard, is_alone, opened, read, rover_of, values_checked
@@ -49,7 +49,6 @@ METAVARS = {
 SECONDS = "s"
 
 
-@app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def goto(
     north: Annotated[
@@ -106,8 +105,12 @@ SHARED = {"terms": TaskOptions, "common": AnyCommon}
 def _parameter(part: Part) -> Parameter:
     """Return the argument or option of a part, whose value is a text."""
     words = part.meaning[:1].upper() + part.meaning[1:]
-    for_example = ", for example 30s or 5m" if part.shape.unit == SECONDS else ""
-    more: dict[str, Any] = {"metavar": _metavar(part), "help": f"{words}{for_example}."}
+    words += ", for example 30s or 5m" if part.shape.unit == SECONDS else ""
+    names = getattr(part.shape, "words", ())
+    words += f": {', '.join(names)}" if names else ""
+    more: dict[str, Any] = {"metavar": _metavar(part), "help": f"{words}."}
+    if names:
+        more["autocompletion"] = completing(names)
     if part.is_required:
         kind, default = Annotated[str, typer.Argument(**more)], Parameter.empty
     else:
@@ -130,8 +133,11 @@ def _read(part: Part, text: str) -> object:
         return text
 
 
-for each in (form for form in FORMS if form not in (GOTO, GOTO_GLOBAL)):  # one command for both
-    _add(each)
+for each in FORMS:
+    if each is GOTO:
+        app.command(cls=NumbersCommand, context_settings=NUMBERS)(goto)
+    elif each is not GOTO_GLOBAL:  # --global of the same command
+        _add(each)
 
 
 async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> None:

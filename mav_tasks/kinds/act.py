@@ -143,7 +143,7 @@ FORM = Form(
     "Act (camera, gripper, relay ...)",
     "Send one command to the rover or a component of it, and wait until it is accepted.",
     (
-        Part("command", COMMAND, "its name, or the number of a MAV_CMD", True),
+        Part("command", COMMAND, "the number of a MAV_CMD, or a name", True),
         *map(_param, range(1, LAST_PARAM + 1)),
         Part(
             "component", Number(1, 255, is_whole=True), "component id; the autopilot if not given"
@@ -151,7 +151,7 @@ FORM = Form(
         Part(
             "time_limit",
             Number(0.1, LONGEST, "s"),
-            f"limit for the answer; {TIME_LIMIT:g} if not given",
+            f"limit for the answer; {TIME_LIMIT:g} s if not given",
         ),
     ),
     act,

@@ -92,7 +92,8 @@ def test_it_says_which_version_it_is() -> None:
 
 
 #: the number of a word of a command, the command, and how that word may go on
-COMPLETED = """2 submit  => drive face goto home move rotate wait
+COMPLETED = """2 submit  => act drive face goto home move rotate wait
+3 submit act v => video-start video-stop
 2 sim --bo => --body --boot
 3 sim --body  => auto bullet kinematic
 3 queue --sign  => """
