@@ -61,6 +61,15 @@ COMMANDS = {
     "mav-tasks keys add agent --role submitter --max-distance 50 --max-speed 0.5 --quota 5": (
         "tests/e2e/test_keys.py"
     ),
+    **dict.fromkeys(
+        (
+            "mav-tasks submit act relay-on",
+            "mav-tasks submit act servo --param1 9 --param2 1700",
+            "mav-tasks submit act photo --component 100",
+            "mav-tasks submit act 2003 --param1 1",
+        ),
+        "tests/e2e/test_cli.py",
+    ),
     "mav-tasks submit move 3 --vehicle any": "tests/e2e/test_cli_fleet.py",
     "mav-tasks modify 12 --every never": "tests/e2e/test_schedules.py",
     "mav-tasks cancel --series 12": "tests/e2e/test_schedules.py",

@@ -1,6 +1,7 @@
 """Show a task until it ends: one updated line on a terminal, else a line or JSON per change."""
 
 import asyncio
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from rich.console import Group
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
-from rich.text import Text
+from rich.text import Text as Line
 
 from mav_tasks.cli import output, words
 from mav_tasks.cli.options import Common
@@ -19,7 +20,7 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of, why_of
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json
-from mav_tasks.client.values import TaskStatus
+from mav_tasks.client.values import News, TaskStatus, Text
 
 LOOK = 0.5  # s between two checks for silence
 BAR_WIDTH = 30  # columns at most
@@ -38,8 +39,14 @@ class View(Protocol):
 
 async def follow(client: Client, task: Task, common: Common) -> None:
     """Show a task until it has ended. Raise TaskFailed unless it completed."""
+    about, said = re.compile(rf"of task {task.id}\b"), list[str]()
+
+    def listen(news: News) -> None:
+        if isinstance(news, Text) and about.search(news.words):
+            said.append(news.words)
+
     try:
-        with _view(client, task.vehicle, common) as view:
+        with client.listening(listen), _view(client, task.vehicle, common) as view:
             looking = asyncio.create_task(_look(client, task, view))
             try:
                 async for status in task.updates():
@@ -51,6 +58,8 @@ async def follow(client: Client, task: Task, common: Common) -> None:
         goes_on = f"{name} is not cancelled; to cancel it: mav-tasks cancel {task.id}"
         sys.stderr.write(f"mav-tasks: {goes_on}\n")
         raise
+    for words_of_it in said:  # such as a rover's answer to an act
+        output.warn(words_of_it)
     await task.done()
 
 
@@ -157,7 +166,7 @@ class Bar:
             grid.add_column(no_wrap=True, overflow="ellipsis")
         grid.add_row(*cells)
         way_on = words.way_on_of(status, is_alone=self._is_alone)
-        return Group(grid, Text(way_on)) if way_on else grid
+        return Group(grid, Line(way_on)) if way_on else grid
 
     def _draw(self) -> None:
         assert self.live is not None, "it is set before anything is shown"

@@ -255,7 +255,8 @@ class TaskRegistry:
 
     def will_act(self, task_id: TaskId, progress: Progress, *, now: float) -> None:
         """Record that an act is about to be told; it is when this is durable."""
-        self.advance(task_id, progress, now=now)
+        self.note_progress(task_id, progress)
+        self.keep_progress(task_id, now=now)
         self._last_event[task_id] = self.recorded
 
     def acts(self, task_id: TaskId, step: int, *, now: float) -> None:

@@ -220,21 +220,25 @@ def test_finished_tasks_are_listed_newest_first(server: str, client: SyncClient)
     assert any(re.match(r"ended         \d\d:\d\d:\d\d .*ago$", line) for line in shown.lines)
 
 
-GOALS = """move 1.5 --speed 0.5 => move 1.5 m
-rotate -90 --rate 30 => rotate -90 deg
-drive -0.2 10 2s => drive -0.2 m/s for 2 s
-goto -1 2 --speed 0.7 => go to -1.00 m N, 2.00 m E
-goto --global -35.36326 149.16524 => go to -35.363260, 149.165240
-face 270 => face 270 deg
-home => return home"""
+GOALS = """submit move 1.5 --speed 0.5 => move 1.5 m
+submit rotate -90 --rate 30 => rotate -90 deg
+submit drive -0.2 10 2s => drive -0.2 m/s for 2 s
+submit goto -1 2 --speed 0.7 => go to -1.00 m N, 2.00 m E
+submit goto --global -35.36326 149.16524 => go to -35.363260, 149.165240
+submit face 270 => face 270 deg
+submit home => return home
+submit act relay-on => act relay-on
+submit act servo --param1 9 --param2 1700 => act servo
+submit act photo --component 100 => act photo of component 100
+submit act 2003 --param1 1 => act command 2003"""
 
 
 def test_each_goal_becomes_what_it_says(server: str, client: SyncClient) -> None:
     client.pause()
     for goal, what in re.findall("(.*) => (.*)", GOALS):
-        (task,) = called("submit", *goal.split(), "--json", server=server).objects
+        (task,) = called(*goal.split(), "--json", server=server).objects
         assert task["what"] == what
-    assert client.queue().waiting_count == 7
+    assert client.queue().waiting_count == 11
 
 
 @pytest.mark.parametrize("halt", ["pause", "stop"])
@@ -381,7 +385,7 @@ cancel => 1 no task is running
 release again => 1 no task is held
 queue --vehicle 7 --timeout 1.5 => 3 rover 7 … rover 1
 submit move 1000000 => 1 1000000
-submit move nan => 2 not a number
+submit move nan => 2 any number
 submit move 1 --priority 11 => 2 11
 submit goto 91 0 --global => 2 91"""
 

@@ -69,4 +69,5 @@ def test_each_example_does_what_it_says(tmp_path: Path) -> None:
         "exactly_once.py",
         "watch.py",
         "stop_button.py",
+        "dock.py",  # a kind of task: tests/unit/kinds
     }

@@ -134,7 +134,7 @@ class MissionReports:
             if ack is not None:
                 result = _name_of(ack.result)
                 words = f"refused command {answered.command} of task {task.id}: {result}"
-                said = vehicle.parts.failsafes.said_lately(now=now)
+                said = vehicle.parts.failsafes.said_since(vehicle.requests.told_at)
                 words += f", {said}" if said else ""
             self._parts.registry.record(VehicleNoted(vehicle.system_id, words, now))
         vehicle.requests.acted.clear()

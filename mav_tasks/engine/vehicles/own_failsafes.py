@@ -29,7 +29,6 @@ FAILSAFE = re.compile(
     re.IGNORECASE,
 )
 NO_FAILSAFE = re.compile(r"cleared|continuing", re.IGNORECASE)
-A_MOMENT = 1.0  # s between the text of a refusal and the refusal
 JUST_NOW = 3.0  # s between the text of a failsafe and the mode that the failsafe sets
 
 
@@ -60,9 +59,9 @@ class OwnFailsafes:
         """Return the vehicle's recent text on why it does not arm, or ""."""
         return self._arming if now - self._arming_at <= LATELY else ""
 
-    def said_lately(self, *, now: float) -> str:
-        """Return the vehicle's last text of a moment ago, or ""."""
-        return self._said if now - self._said_at <= A_MOMENT else ""
+    def said_since(self, at: float) -> str:
+        """Return the vehicle's last text since then, or ""."""
+        return self._said if self._said_at >= at else ""
 
     def mode_changed(self, *, now: float) -> str:
         """Note a mode change. Return the failsafe that caused it, or "" if none is known yet."""

@@ -64,6 +64,7 @@ class VehicleRequests:
         #: the plans' commands refused or not answered; who reports them clears it
         self.unperformed: list[Answered] = []
         self._act: m.CommandLong | m.CommandInt | None = None  # told, and not answered yet
+        self.told_at = -inf  # when the last act was told
         #: the answer to it; who reports it clears it
         self.acted: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
@@ -167,7 +168,7 @@ class VehicleRequests:
         self, command: m.CommandLong | m.CommandInt, *, give_up_after: float, now: float
     ) -> None:
         """Send a command once, because a vehicle carries out each copy."""
-        self._act = command
+        self._act, self.told_at = command, now
         self.is_home_old |= command.command == MavCmd.DO_SET_HOME
         self._sender.request(command, now=now, give_up_after=give_up_after, repeats=False)
         self.flush(now=now)

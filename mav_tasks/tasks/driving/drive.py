@@ -123,7 +123,8 @@ class Drive:
             progress = replace(progress, done=0.0)
         if self._course is not None:
             self._course.progress = replace(self._course.progress, done=progress.done)
-        self._registry.advance(task.id, progress, now=now)
+        self._registry.note_progress(task.id, progress)
+        self._registry.keep_progress(task.id, now=now)
         return True
 
     def limit(self, demand: Demand, *, elapsed: float, now: float) -> Demand:

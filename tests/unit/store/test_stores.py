@@ -253,18 +253,6 @@ def test_a_locked_store_holds_nothing_up_and_nothing_is_lost(place: str) -> None
         assert [event for _, event in store.journal()] == [submitted(n) for n in range(1, 101)]
 
 
-def test_what_may_be_lost_is_told_if_the_last_try_takes_too_long(
-    place: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("mav_tasks.store.durable.CLOSE_LIMIT", 0.0)
-    monkeypatch.setattr("mav_tasks.store.writer.LAST_TRY", 0.0)
-    with opened(place) as store, locked(place):
-        store.append([submitted(1)])
-        time.sleep(0.05)
-        store.close()
-        assert "1 events or more may be lost" in store.take_outcomes()[-1].text  # type: ignore[union-attr]
-
-
 def test_a_stuck_disk_is_given_up_in_the_end(place: str) -> None:
     with opened(place) as store, locked(place) as other:
         store.append([submitted(1)])
