@@ -8,6 +8,7 @@ stops a rover, and a stored task needs no plug-in to be read.
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from importlib.metadata import entry_points
+from keyword import iskeyword
 from typing import Any, NamedTuple
 
 from mav_tasks.errors import SettingError
@@ -19,7 +20,7 @@ GROUP = "mav_tasks.kinds"
 #: names of options that each submission has on the command line
 TAKEN = (
     *("kind", "priority", "after", "start_in", "start_at", "every", "deadline", "nonce", "label"),
-    *("wait", "server", "vehicle", "timeout", "sign", "keys", "json"),
+    *("wait", "server", "vehicle", "timeout", "sign", "keys", "json", "help", "terms", "common"),
 )
 
 
@@ -54,7 +55,8 @@ def _wrong_with(form: object, known: Collection[str]) -> str:
     if len(names) < len(form.numbers) or len(set(names)) < len(names):
         return "its numbers are not Parts with names of their own"
     for name in (form.name, *names):
-        if not (name.isascii() and name.isidentifier() and name.islower()):
+        is_name = name.isascii() and name.isidentifier() and name.islower()
+        if not is_name or iskeyword(name):
             return f"name {name!r}: expected lower case letters, digits and underscores"
     if form.name in known:
         return f"there is a kind {form.name} already"

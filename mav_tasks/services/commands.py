@@ -128,6 +128,7 @@ class _Request:
     is_outdated: Callable[[], bool] = lambda: False  # while it waits; then it is not sent
     turn: int = 0  # commands of the same client that were before it in the lane
     joined: list["_Request"] = field(default_factory=list)  # of other clients, the same wish
+    counts_from_send: bool = False  # the time in which it must be answered
 
     @property
     def wait_until(self) -> float:
@@ -188,6 +189,35 @@ class CommandSender:
         retry = Retry.starting(now=now, interval=interval, give_up_after=give_up_after)
         lane = (message.target_component, message.command)
         self._enqueue(_Request(None, lane, message, None, retry, is_urgent=immediate), now=now)
+
+    def once(
+        self,
+        message: CommandLong | CommandInt,
+        *,
+        component: int,
+        now: float,
+        give_up_after: float,
+        is_outdated: Callable[[], bool],
+    ) -> None:
+        """Send a command of our own once, which ``component`` answers; the time counts from then.
+
+        If it is outdated when its turn comes, it is answered unsent.
+        """
+        retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
+        lane = (component, message.command)
+        request = _Request(None, lane, message, None, retry, is_outdated=is_outdated)
+        request.counts_from_send = True
+        self._enqueue(request, now=now)
+
+    def drop(self, message: CommandLong | CommandInt) -> None:
+        """Forget a command of our own: it is not sent any more, and has no answer."""
+        for lane in self._lanes.values():
+            lane.waiting = [each for each in lane.waiting if each.message is not message]
+            flying = lane.in_flight
+            if flying is not None and flying.message is message:
+                lane.quiet_until = flying.retry.sent_at + LATE
+                lane.late = flying.retry.sent
+                lane.in_flight = None
 
     def repeat(self, message: CommandLong | CommandInt, *, now: float) -> bool:
         """Send one copy more of a command of our own, which is given up as much later.
@@ -388,6 +418,8 @@ class CommandSender:
             self._send(flying, now=now)
 
     def _send(self, request: _Request, *, now: float) -> None:
+        if request.counts_from_send and not request.retry.sent:
+            request.retry.give_up_at += now - request.retry.next_at
         request.retry.note_sent(now)
         self._outgoing.append(request.message if request.packet is None else request.packet)
 

@@ -4,14 +4,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import NO_FAULTS, Faults
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED
+from tests.kit.client import ACCEPTED, packed
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import check, item
 from tests.kit.store import PromptSqliteStore
@@ -114,6 +115,41 @@ def test_a_pause_before_its_answer_keeps_what_is_known(world: World, *, answers:
     after = (S.COMPLETED, R.NONE) if answers else (S.HELD, R.OUTCOME_UNKNOWN)
     assert world.state(task) == after
     assert times_told(world) == 1
+
+
+def test_the_answer_counts_also_if_another_task_goes_first_meanwhile(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(queueing=Queueing(preemption_gap=2)))
+    world.fault(UNANSWERED)
+    task = upload(world, TOLD)
+    world.until(lambda: times_told(world) == 1, within=10.0)
+    other = upload(world, "NAV_WAYPOINT at=1,0; TASK_OPTIONS 10 frame=2")
+    world.until_state(other, S.EXECUTING)
+    late = common.MAVLink_command_ack_message(RELAY, 0, 0, 0, 0, 0)
+    world.from_vehicle_side(packed(late, 1, 1, seq=200), peer="rover1")
+    world.run(15.0)
+    assert [world.state(each)[0] for each in (task, other)] == [S.COMPLETED] * 2
+    assert times_told(world) == 1
+
+
+def test_what_waits_to_be_told_is_not_told_once_it_is_cancelled(world: World) -> None:
+    world.fault(UNANSWERED)
+    world.client.pause()
+    task = upload(world, TOLD)
+    world.client.proceed()
+    world.until_state(task, S.EXECUTING)
+    world.client.command(RELAY, 5, 1, target=(1, 1))  # a client's own, which goes first
+    world.until(lambda: world.task(task).progress.done > 0.0, within=10.0)
+    world.client.command(54010, task)
+    world.run(12.0)
+    assert world.state(task)[0] is S.CANCELLED
+    assert times_told(world) == 1
+
+
+def test_what_comes_before_it_in_a_plan_is_done_before_it(world: World) -> None:
+    first = "DO_SET_SERVO 9 1500 0 0 frame=2; CONDITION_DELAY 3 0 0 0 frame=2; DO_GRIPPER frame=2"
+    world.until_state(upload(world, f"{first}; {TOLD}"), S.COMPLETED)
+    told = [name for name in world.observer.sent_since(0) if name in ("181", "183", "211")]
+    assert told == ["183", "211", "181"]
 
 
 def test_a_stop_ends_it(world: World) -> None:

@@ -28,9 +28,12 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
 )
 from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TERMINAL
 from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.task import TaskId
 
 INTERVAL = 1.0  # s, of MISSION_CURRENT
+OVER = TERMINAL | {S.HELD}  # states in which no answer to an act counts any more
 ENDS_TOLD = 5  # repeats of the last item's MISSION_ITEM_REACHED; PX4 sends 10
 #: messages of the vehicle that are withheld while the server has its missions
 REPLACED = {
@@ -81,6 +84,8 @@ class MissionReports:
                 case PlanStored():
                     changed.add(event.vehicle)
                 case TaskChanged() | TaskAdvanced():
+                    if isinstance(event, TaskChanged) and event.new in OVER:
+                        self._drop_acts(event)
                     task = self._parts.registry.get(event.task_id)
                     if task is not None and isinstance(task.goal, Plan):
                         changed.add(event.vehicle)
@@ -120,20 +125,26 @@ class MissionReports:
         if vehicle is not None and task is not None and isinstance(task.goal, Plan):
             act = task.goal.steps[event.step]
             assert isinstance(act, Act), "only an act is told"
-            vehicle.act(act, now=now)
+            vehicle.act((event.task_id, event.step), act, now=now)
+
+    def _drop_acts(self, event: TaskChanged) -> None:
+        if vehicle := self._parts.vehicles.get(event.vehicle):
+            vehicle.requests.drop_acts(event.task_id)
 
     def tell_acted(self, vehicle: Vehicle, *, now: float) -> None:
         """Let a task that acts know the answer, and record in words one that is no yes."""
-        for answered in vehicle.requests.acted:
+        for (task_id, step), answered in vehicle.requests.acted:
             ack = answered.ack
             accepted = None if ack is None else ack.result == MavResult.ACCEPTED
-            task = vehicle.tasks.executor.act_answered(accepted=accepted, now=now)
-            if task is None or accepted:
+            is_noted = vehicle.tasks.executor.act_answered(
+                TaskId(task_id), step, accepted, was_sent=answered.was_sent, now=now
+            )
+            if not is_noted or accepted or not answered.was_sent:
                 continue
-            words = f"did not answer command {answered.command} of task {task.id}"
+            words = f"did not answer command {answered.command} of task {task_id}"
             if ack is not None:
                 result = _name_of(ack.result)
-                words = f"refused command {answered.command} of task {task.id}: {result}"
+                words = f"refused command {answered.command} of task {task_id}: {result}"
                 said = vehicle.parts.failsafes.said_since(vehicle.requests.told_at)
                 words += f", {said}" if said else ""
             self._parts.registry.record(VehicleNoted(vehicle.system_id, words, now))

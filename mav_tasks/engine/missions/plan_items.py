@@ -212,7 +212,7 @@ def _resolved(items: Sequence[Item], steps: Sequence[Step]) -> Iterator[Step]:
         elif isinstance(step, GoTo) and step.turns and not step.place:
             before = [place for place in places[:seq] if place]
             yield replace(step, place=before[-1]) if before else Nothing()
-        elif acts[seq] and not isinstance([*steps[seq + 1 :], None][0], Perform):
+        elif acts[seq] and not (seq + 1 < len(steps) and isinstance(steps[seq + 1], Perform)):
             words = f"item {seq + 1}: TASK_ACT is about the next item, which is sent to no rover"
             raise Rejection(R.BAD_PARAMETER, words)
         elif seq and acts[seq - 1]:

@@ -22,7 +22,7 @@ from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.shown import ShownHeartbeat
 from mav_tasks.engine.vehicles.takeovers import Takeovers
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
-from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
+from mav_tasks.engine.vehicles.vehicle_requests import ActKey, VehicleRequests
 from mav_tasks.kinds import Act
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -39,7 +39,8 @@ from mav_tasks.services.vehicle_status import (
 )
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.halts import LastHalt, Permit
-from mav_tasks.tasks.lifecycle import RUNNING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
+from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
@@ -400,11 +401,14 @@ class Vehicle:
             now=now,
         )
 
-    def act(self, act: Act, *, now: float) -> None:
-        """Send the command of an act that is due."""
-        active = self.tasks.active
-        if self.tasks.is_stopped or active is None or active.state is not TaskState.EXECUTING:
-            return  # cancelled in the very step that was to send it
+    def act(self, key: ActKey, act: Act, *, now: float) -> None:
+        """Send the command of an act that is due, unless its task is interrupted before."""
+
+        def is_outdated() -> bool:
+            active = self.tasks.active
+            is_driven = active is not None and (active.id, active.state) == (key[0], S.EXECUTING)
+            return self.tasks.is_stopped or not is_driven
+
         params: list[Any] = [*act.params]
         command: m.CommandLong | m.CommandInt = m.CommandLong(
             self.system_id, act.component, act.command, 0, *params
@@ -414,7 +418,15 @@ class Vehicle:
             command = m.CommandInt(
                 self.system_id, act.component, act.frame, act.command, 0, 0, *params
             )
-        self.requests.act(command, give_up_after=act.time_limit, now=now)
+        self.requests.act(
+            key,
+            command,
+            # an autopilot answers, and executes, commands to a component that does not exist
+            component=act.component if act.component in self.components else AUTOPILOT,
+            give_up_after=act.time_limit,
+            is_outdated=is_outdated,
+            now=now,
+        )
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
         """Send a vehicle command that a plan item orders."""

@@ -3,14 +3,14 @@
 It decides nothing but the order in which packets leave.
 """
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from math import inf
 
 from mav_tasks.engine.inputs import Outgoing, Place
 from mav_tasks.engine.packets import PacketSender
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
@@ -32,6 +32,9 @@ SHOW = 0.25  # s in which a requested heartbeat must come; the next regular one 
 ASK_TO_SHOW = 3  # times in a row that a vehicle may leave that request unanswered
 #: commands after which clients wait for a heartbeat that shows the result
 SHOWN = frozenset({MavCmd.DO_SET_MODE, MavCmd.DO_SET_STANDARD_MODE, MavCmd.COMPONENT_ARM_DISARM})
+
+#: the task of an act, and its step
+ActKey = tuple[int, int]
 
 
 class VehicleRequests:
@@ -63,10 +66,10 @@ class VehicleRequests:
         self._performed: set[int] = set()  # command ids that plans have ordered
         #: the plans' commands refused or not answered; who reports them clears it
         self.unperformed: list[Answered] = []
-        self._act: m.CommandLong | m.CommandInt | None = None  # told, and not answered yet
+        self._acts: dict[ActKey, m.CommandLong | m.CommandInt] = {}  # not answered yet
         self.told_at = -inf  # when the last act was told
-        #: the answer to it; who reports it clears it
-        self.acted: list[Answered] = []
+        #: the answers to acts; who reports them clears it
+        self.acted: list[tuple[ActKey, Answered]] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         #: what the vehicle is asked for, how it stops by itself, turns and drives
@@ -102,14 +105,7 @@ class VehicleRequests:
         self.move_to(self._outlet.shut())
 
     def receive(self, ack: m.CommandAck, *, component: int, now: float) -> None:
-        """Process an answer of the vehicle.
-
-        ArduPilot's autopilot carries out itself, and answers, what a component is told that it does
-        not know (4.6.3, SITL).
-        """
-        act = self._act
-        if act is not None and (ack.command, component) == (act.command, AUTOPILOT):
-            component = act.target_component
+        """Process an answer of the vehicle."""
         self._sender.receive(ack, component=component, now=now)
         self.flush(now=now)
 
@@ -165,19 +161,39 @@ class VehicleRequests:
         self.flush(now=now)
 
     def act(
-        self, command: m.CommandLong | m.CommandInt, *, give_up_after: float, now: float
+        self,
+        key: ActKey,
+        command: m.CommandLong | m.CommandInt,
+        *,
+        component: int,
+        give_up_after: float,
+        is_outdated: Callable[[], bool],
+        now: float,
     ) -> None:
-        """Send a command once, because a vehicle carries out each copy."""
-        self._act, self.told_at = command, now
+        """Send a command once, because a vehicle carries out each copy.
+
+        ``component`` answers it. It is not sent if it is outdated when its turn comes.
+        """
+        self.drop_acts(key[0])  # its answer would be to an earlier step
+        self._acts[key], self.told_at = command, now
         self.is_home_old |= command.command == MavCmd.DO_SET_HOME
-        self._sender.request(command, now=now, give_up_after=give_up_after, repeats=False)
+        self._sender.once(
+            command,
+            component=component,
+            now=now,
+            give_up_after=give_up_after,
+            is_outdated=is_outdated,
+        )
         self.flush(now=now)
+
+    def drop_acts(self, task_id: int | None = None) -> None:
+        """Forget the acts of a task, None: of all; what is not sent yet will not be."""
+        for key in [key for key in self._acts if task_id in (None, key[0])]:
+            self._sender.drop(self._acts.pop(key))
 
     def end_performing(self) -> None:
         """Stop sending what plans have ordered, on STOP or a takeover."""
-        if self._act is not None:
-            self._sender.withdraw(self._act.target_component, self._act.command)
-            self._act = None
+        self.drop_acts()
         for command in self._performed:
             self._sender.withdraw(self._target.component_id, command)
         self._performed.clear()
@@ -312,9 +328,9 @@ class VehicleRequests:
             self.answers.append(answer)
         elif is_request_of(answer):
             self.control.answered(answer, now=now)
-        elif answer.request is self._act:
-            self._act = None
-            self.acted.append(answer)
+        elif key := next((key for key, act in self._acts.items() if act is answer.request), None):
+            del self._acts[key]
+            self.acted.append((key, answer))
         elif answer.command in self._performed:
             if result != MavResult.ACCEPTED:
                 self.unperformed.append(answer)

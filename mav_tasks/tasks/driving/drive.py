@@ -110,20 +110,37 @@ class Drive:
         if self._course is not None:
             self._course.progress = replace(self._course.progress, speed=speed)
 
-    def act_answered(self, task: Task, accepted: bool | None, *, now: float) -> bool:
-        """Note the answer to a task's act, None: there was none. Return whether it is acting."""
-        goal, progress = goal_of(task), task.progress
-        if not isinstance(goal, Act) or progress.done != TOLD:
+    def act_answered(
+        self,
+        task: Task,
+        step: int,
+        accepted: bool | None,
+        *,
+        was_sent: bool,
+        is_active: bool,
+        now: float,
+    ) -> bool:
+        """Note the answer to an act, None: there was none. Return whether it was awaited."""
+        progress, is_driven = task.progress, is_active and task.state is S.EXECUTING
+        is_awaited = isinstance(goal_of(task), Act) and (progress.step, progress.done) == (
+            step,
+            TOLD,
+        )
+        if not is_awaited or (is_driven and not self._told_act):
             return False
         if accepted:
-            progress = replace(progress, done=ACCEPTED)
-        elif task.state is S.EXECUTING:
-            self._act_failed = R.NO_ANSWER if accepted is None else R.REFUSED
-        elif accepted is not None:  # it is not done: when the task resumes, it is told again
-            progress = replace(progress, done=0.0)
-        if self._course is not None:
-            self._course.progress = replace(self._course.progress, done=progress.done)
-        self._registry.note_progress(task.id, progress)
+            done = ACCEPTED
+        elif not was_sent or (accepted is not None and not is_driven):
+            done = 0.0  # it is not done, and is told again when it is its turn
+        else:
+            if is_driven:
+                self._act_failed = R.NO_ANSWER if accepted is None else R.REFUSED
+            return True
+        if is_active:
+            self._told_act = False
+            if self._course is not None:
+                self._course.progress = replace(self._course.progress, done=done)
+        self._registry.note_progress(task.id, replace(progress, done=done))
         self._registry.keep_progress(task.id, now=now)
         return True
 
@@ -273,7 +290,8 @@ class Drive:
             self._stuck.begin(now=now)
             return view.STAND
         if isinstance(course.leg, Act):
-            self._act(task, course, now=now)
+            if not course.progress.pending:  # what comes before it in the plan is done before it
+                self._act(task, course, now=now)
             return view.STAND
         if self._stuck.is_stuck(course, seen, limit=watch.stuck, now=now):
             raise Becomes(S.FAILED, R.STUCK)

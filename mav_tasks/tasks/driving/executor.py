@@ -137,14 +137,19 @@ class Executor:
             progress = replace(progress, done=goal_of(task).released(progress.done))
         self._change(S.STARTING, actor=actor, now=now, progress=progress)
 
-    def act_answered(self, *, accepted: bool | None, now: float) -> Task | None:
-        """Note the vehicle's answer to the active task's act, None: there was none in time.
+    def act_answered(
+        self, task_id: TaskId, step: int, accepted: bool | None, *, was_sent: bool, now: float
+    ) -> bool:
+        """Note the vehicle's answer to an act, which may be set aside; None: none came in time.
 
-        Return the task, None if it is not acting.
+        Return whether it was awaited.
         """
-        task = self.task
-        return (
-            task if task is not None and self.drive.act_answered(task, accepted, now=now) else None
+        task = self._registry.get(task_id)
+        if task is None:
+            return False
+        is_active = task_id == self.task_id
+        return self.drive.act_answered(
+            task, step, accepted, was_sent=was_sent, is_active=is_active, now=now
         )
 
     def set_speed(self, speed: float | None) -> None:

@@ -77,7 +77,11 @@ def form(name: str = "mine", *parts: str) -> Form:
     [
         (form("move"), "there is a kind move already"),
         (form("My kind"), "name 'My kind': expected lower case letters, digits and underscores"),
-        (form("mine", "priority"), "priority: an option of each task has this name"),
+        (form("mine", "terms"), "terms: an option of each task has this name"),
+        (
+            form("mine", "class"),
+            "name 'class': expected lower case letters, digits and underscores",
+        ),
         (form("mine", "a", "a"), "its numbers are not Parts with names of their own"),
     ],
 )
