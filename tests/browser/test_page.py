@@ -156,6 +156,7 @@ goto north=1 east=0.5: go to 1.00 m N, 0.50 m E
 goto_global latitude=-35.36326 longitude=149.16523: go to -35.363260
 face heading=90: face 90 deg
 wait duration=1: wait 1 s
+act command=relay-on param1=2: act relay-on
 home: return home"""
 
 
@@ -173,7 +174,7 @@ def test_tasks_of_every_kind_are_added_with_the_form(chromium: Any, it: Web) -> 
             page.click(".box >> text='Add the task'")
             page.wait_for_selector(".box", state="detached")
             says(page, "#panel-queue .task", f"“{kind}”: {words}")
-    assert it.get("/vehicles/1/queue")["waiting_count"] == 8
+    assert it.get("/vehicles/1/queue")["waiting_count"] == 9
 
 
 def test_order_by_arrows_and_by_dragging_leaves_priorities_alone(chromium: Any, it: Web) -> None:
