@@ -100,9 +100,10 @@ class Act(Leg):
         if len(self.params) != LAST_PARAM:
             raise ValueError(f"{self}: expected {LAST_PARAM} parameters, not {len(self.params)}")
         for index, value in enumerate(self.params, 1):
-            whole = index not in INTEGERS or (value == int(value) and abs(value) <= LARGEST)
-            if not isfinite(value) or not whole:
-                kind = "a whole number" if index in INTEGERS else "a number"
+            is_whole = index in INTEGERS
+            fits = isfinite(value) and abs(value) <= LARGEST and value == int(value)
+            if not (fits if is_whole else isfinite(value)):
+                kind = "a whole number" if is_whole else "a number"
                 raise ValueError(f"{self}: param{index} {value:g} is not {kind}")
         one, two, three, four, x, y, z = self.params
         whom = Sent(MavCmd.TASK_ACT, float(self.component), self.time_limit)

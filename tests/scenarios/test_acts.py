@@ -1,11 +1,13 @@
 """One command to the rover or its camera, as a task: told once, and done when it is accepted."""
 
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks import Act
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -176,3 +178,12 @@ plan; TASK_ACT 1 601; DO_SET_RELAY 0 1 END : INVALID_PARAM2 time limit 601 not i
 plan; TASK_ACT; DO_SET_RELAY 0 1 END; DO_JUMP 0 -1 END : INVALID a loop without motion
 """.replace("END", "0 0 0 frame=2"),
     )
+
+
+@for_each(
+    "value, at, kind", [(nan, 1, "a"), (inf, 7, "a"), (inf, 5, "a whole"), (0.5, 6, "a whole")]
+)
+def test_a_parameter_that_cannot_be_sent_is_named(value: float, at: int, kind: str) -> None:
+    params = tuple(value if index == at else 0.0 for index in range(1, 8))
+    with pytest.raises(ValueError, match=rf"param{at} \S+ is not {kind} number"):
+        assert Act(RELAY, params).sent
