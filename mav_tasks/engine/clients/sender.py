@@ -91,7 +91,7 @@ class Sender:
             memory.forget(packets.popitem(last=False)[1])
         return said
 
-    def earlier(self, said: Said, *, within: float = inf, now: float) -> Iterator[Said]:
+    def earlier(self, said: Said, *, now: float, within: float = inf) -> Iterator[Said]:
         """Yield the equal commands of the last so many seconds but this one, the latest first."""
         for each in reversed(self._memory.contents.get(said.content, ())):
             if each is not said and now - each.at <= within:
