@@ -63,7 +63,11 @@ class Gateway:
 
     def join(self, replaced: Eviction | None = None) -> None:
         """Begin a lease, and a store under it."""
-        self.epoch = self.asks(Join(self.name, replaced)).row.epoch
+        row = self.asks(Join(self.name, replaced)).row
+        if not row.epoch:  # an earlier attempt was carried out, and only its answer came late
+            (own,) = (each for each in row.rivals if each.name == self.name)
+            row = self.asks(Join(self.name, Eviction(own.name, own.epoch, own.renewals))).row
+        self.epoch = row.epoch
         assert self.epoch
         self.open()
 
