@@ -10,7 +10,6 @@ from importlib.util import find_spec
 
 import pytest
 
-from mav_tasks.engine import engine
 from tests.kit.places import place as place
 from tests.kit.postgres import postgres as postgres
 from tests.kit.postgres import postgres_server as postgres_server
@@ -57,17 +56,12 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest; skip what lacks something. What patches the core passes as Python."""
+    """Begin with the longest; skip what lacks something."""
     for item in items:
         if f"\n{item.name}\n" in LONG_TESTS:
             item.add_marker("volume")
     # else the last one runs alone for a minute
     items.sort(key=lambda item: TAKE_LONG.isdisjoint(mark.name for mark in item.iter_markers()))
-    lacks = {
-        "pybullet": "" if find_spec("pybullet") else "pybullet has no wheel for this Python",
-        "patches_core": "" if engine.__file__.endswith(".py") else "the core is compiled",
-    }
-    for item in items:
-        for mark in item.iter_markers():
-            if why := lacks.get(mark.name):
-                item.add_marker(pytest.mark.skip(why))
+    for item in () if find_spec("pybullet") else items:
+        if item.get_closest_marker("pybullet"):
+            item.add_marker(pytest.mark.skip("pybullet has no wheel for this Python"))

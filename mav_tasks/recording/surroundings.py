@@ -19,7 +19,6 @@ def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
 
     A missing value is the default; raise ValueError for an unknown name.
     """
-    # not the type hints: compiled, a class has less of them
     makers = {field.name: field.default_factory for field in fields(kind)}
     unknown = sorted(set(values) - set(makers))
     if unknown:

@@ -14,7 +14,6 @@ MAY_LACK = (
     "this machine does not allow a network of one's own",
     "PostgreSQL",  # pgserver has no wheel for the machine
     "no Chromium",
-    "the core is compiled",
     "pybullet",  # no wheel for Python 3.12 and later
     "the package that compresses",  # of MCAP, optional there
 )

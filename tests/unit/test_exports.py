@@ -23,7 +23,6 @@ def public(thing: object) -> list[str]:
     return sorted(name for name in vars(thing) if not name.startswith("_"))
 
 
-@pytest.mark.patches_core
 def test_the_engine_has_five_methods_and_six_views() -> None:
     methods = ["handle", "handle_deadline", "next_deadline", "take_events", "take_packets"]
     views = ["snapshot", "parameters", "reach", "expected", "stop_until", "has_heard"]

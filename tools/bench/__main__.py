@@ -11,8 +11,6 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict
 
-from tests.kit.other_revision import checked_out
-
 from . import (
     against,
     calls,
@@ -87,14 +85,11 @@ def main() -> None:
     parser.add_argument("--profile", metavar="FILE", help="profile the server of one measurement")
     parser.add_argument("--against", metavar="REVISION", help="measure that revision's server, too")
     parser.add_argument(
-        "--compiled", action="store_true", help="measure the server with a compiled core, too"
-    )
-    parser.add_argument(
         "--rounds",
         type=int,
         default=3,
         metavar="N",
-        help="with --against or --compiled: rounds (default 3)",
+        help="with --against: rounds (default 3)",
     )
     parser.add_argument(
         "--names",
@@ -113,7 +108,7 @@ def main() -> None:
             parser.error(f"--profile goes with one of {', '.join(PROFILED)}")
         print(render(PROFILED[arguments.what[0]](arguments.profile)))
         return
-    if arguments.against is not None or arguments.compiled:
+    if arguments.against is not None:
         _measure_against(parser, arguments)
         return
     rows = [row for name in arguments.what or MEASUREMENTS for row in _measured(name, arguments)]
@@ -127,22 +122,18 @@ def _measured(name: str, arguments: argparse.Namespace) -> list[Row]:
 
 
 def _measure_against(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
-    if arguments.against is not None and arguments.compiled:
-        parser.error("--against, --compiled: choose one of them")
-    with_turns = () if arguments.compiled else ("turns",)
-    what = arguments.what or [*OF_A_SERVER, *with_turns]
-    alone = [name for name in what if name not in (*OF_A_SERVER, *with_turns)]
+    what = arguments.what or [*OF_A_SERVER, "turns"]
+    alone = [name for name in what if name not in (*OF_A_SERVER, "turns")]
     if alone:
-        option = "--compiled" if arguments.compiled else "--against"
-        parser.error(f"{option} does not go with {', '.join(alone)}")
+        parser.error(f"--against does not go with {', '.join(alone)}")
     if arguments.rounds < 1:
         parser.error("--rounds: expected a number from 1 on")
     if "turns" in what:
         print(render(turns.measure(arguments.against, names=arguments.names)))
     servers = [name for name in what if name != "turns"]
     if servers:
-        other = against.compiled() if arguments.compiled else checked_out(arguments.against)
-        print(against.render(against.measure(other, servers, rounds=arguments.rounds)))
+        pairs = against.measure(arguments.against, servers, rounds=arguments.rounds)
+        print(against.render(pairs))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,4 @@
-"""The same measurements of this server and of another one's, alternating in one run.
-
-The other is that of another revision, or this one with a compiled core.
+"""The same measurements of this server and of another revision's, alternating in one run.
 
 Clients, floods and simulated rovers are this revision's for both: only the server differs. Each
 measurement is repeated in alternating order, so that a machine that slows down affects both alike.
@@ -12,8 +10,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -37,22 +34,10 @@ class Pair:
     there: tuple[float, ...]
 
 
-@contextmanager
-def compiled() -> Iterator[Path]:
-    """Return a folder with the files of HEAD, and the compiled core of the present ones."""
-    with checked_out("HEAD") as tree:
-        print("compiling the core: minutes", file=sys.stderr, flush=True)
-        command = [sys.executable, "tools/compile_core.py", str(tree)]
-        subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-        yield tree
-
-
-def measure(
-    other: AbstractContextManager[Path], names: Sequence[str], *, rounds: int
-) -> list[Pair]:
-    """Return the figures of each measurement for both servers; ``other``: the other's folder."""
+def measure(revision: str, names: Sequence[str], *, rounds: int) -> list[Pair]:
+    """Return the figures of each measurement for both servers."""
     pairs: list[Pair] = []
-    with other as tree:
+    with checked_out(revision) as tree:
         for name in names:
             figures: dict[Path, list[dict[str, str]]] = {ROOT: [], tree: []}
             try:

@@ -201,7 +201,6 @@ def each_row_is_about_something_that_happens(graph: Graph) -> None:
     assert [TABLE[i] for i in unused] == []
 
 
-@pytest.mark.patches_core
 @pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda each: each.name)
 def test_the_server_does_what_the_graph_is_made_of(
     persona: Persona, monkeypatch: pytest.MonkeyPatch
