@@ -1,28 +1,8 @@
-"""The exceptions that this package raises on purpose, in one tree.
+"""The exceptions that this package raises on purpose; all are MavTasksErrors.
 
-::
-
-    MavTasksError
-    ├── UsageError            the operator can fix it: one clear line, exit status 2
-    │   ├── LinkUrlError      a malformed link URL
-    │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
-    │   ├── InsecureLinkError a link beyond loopback without a key
-    │   ├── StoreError        a store that cannot be opened or read at start
-    │   ├── RecordError       a record that cannot be written or read
-    │   ├── PlanFileError     a mission file that cannot be read or parsed
-    │   ├── ConfigError       an unreadable or invalid configuration, with all its faults
-    │   │   └── KeyRingError  an unreadable or invalid key ring; the text contains no secret
-    │   └── SettingError      an invalid value of a setting
-    ├── Rejection             a refused request: reason code, and text for the client
-    ├── ClientError           a request to a task server failed
-    │   ├── NoAnswer          no answer in time
-    │   │   └── LinkDown      the link is down: a device or a host is missing
-    │   ├── Refused           the server refused, with its reason
-    │   ├── NoSuchVehicle     no such rover, or several and none was named
-    │   └── TaskFailed        a task ended in another state than completed
-    └── IllegalTransition     a bug: a transition that the lifecycle table lacks
-
-Received bytes never raise: they are parsed to a value, or counted (see ``mavlink``).
+UsageError: the operator can fix it; one clear line, exit status 2. Rejection: the server refuses a
+request. ClientError: a client's request failed. Received bytes never raise: they are parsed to a
+value, or counted (see ``mavlink``).
 """
 
 from errno import EADDRINUSE
