@@ -55,14 +55,19 @@ def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, how: str) -
     assert world.mode() is Mode.MANUAL
 
 
-def test_a_pause_stops_a_rover_that_a_client_drives(world: World) -> None:
+def driven_by_a_client(world: World) -> World:
     world.client.mode(GUIDED)
-    world.run(0.5)
+    world.run(1.5)
     world.client.arm(True)
-    world.run(0.5)
+    world.run(1.5)
     world.client.stream(setpoint(1.0), rate=20)
     world.run(2)
     assert not world.stands()
+    return world
+
+
+def test_a_pause_stops_a_rover_that_a_client_drives(world: World) -> None:
+    driven_by_a_client(world)
     world.client.end_streams()
     sent = world.add_client("other").pause()
     world.run(3)
@@ -84,13 +89,8 @@ def test_a_disarm_is_not_undone_by_an_arming_that_waited(make_world: MakeWorld) 
 
 
 def test_a_disarm_ends_a_clients_stream_at_once(make_world: MakeWorld) -> None:
-    world = make_world(persona=ARDUPILOT)  # which shows that it is disarmed once a second
-    world.client.mode(GUIDED)
-    world.run(1.5)
-    world.client.arm(True)
-    world.run(1.5)
-    world.client.stream(setpoint(1.0), rate=20)
-    world.run(2)
+    # which shows that it is disarmed once a second
+    world = driven_by_a_client(make_world(persona=ARDUPILOT))
     at = world.now
     world.add_client("other").arm(False)
     world.run(0.1)
