@@ -85,16 +85,13 @@ def open_journal(place: str, which: Which) -> Journal:
 
 
 def read_parameters(place: str) -> dict[str, float]:
-    """Return the parameters in a file; {} if it does not exist.
-
-    A file of an older version, which may lack the table, is not migrated.
-    """
+    """Return the parameters in a file; {} if it does not exist, or has no tables yet."""
     try:
         path = path_of(place).expanduser().absolute()
         if not path.exists():
             return {}
         with closing(SqliteReader(path)) as reader:
-            return reading.read_parameters(reader) if reader.has("parameters") else {}
+            return {} if reader.is_empty() else reading.read_parameters(reader)
     except (OSError, RuntimeError) as error:
         raise StoreError(f"store {place}: {error}") from error
 

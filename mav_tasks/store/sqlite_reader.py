@@ -26,12 +26,6 @@ class SqliteReader:
     def __repr__(self) -> str:
         return f"SqliteReader({self.name})"
 
-    def has(self, table: str) -> bool:
-        """Whether the file has a table."""
-        query = "SELECT count(*) FROM sqlite_master WHERE name = ?"
-        with in_one_line(self):
-            return bool(self.connection.execute(query, (table,)).fetchone()[0])
-
     def is_empty(self) -> bool:
         """Whether the file has no table yet."""
         with in_one_line(self):

@@ -61,6 +61,35 @@ FIRST, SECOND = (SignatureTime("key", link, 1, 1, 7) for link in (0, 1))
 JOURNALLED = [each for each in get_args(Event) if each not in (TaskProgressed, SignaturesSeen)]
 
 
+#: by the kind of place: what makes the schema before of this one; last: the one before that
+OLDER = {
+    True: (
+        "DROP INDEX of_kind",
+        "CREATE INDEX of_no_task ON journal (number)",
+        "UPDATE versions SET version = 7",
+        "UPDATE versions SET version = version - 2",
+    ),
+    False: ("DROP INDEX of_kind", "PRAGMA user_version = 11", "PRAGMA user_version = 10"),
+}
+
+
+def test_a_store_of_the_schema_before_is_converted_and_an_older_one_refused(place: str) -> None:
+    with opened(place) as store:
+        keep(store, submitted(1))
+    *before, older = OLDER["://" in place]
+    with tables(place) as file:
+        for statement in before:
+            file.execute(statement)
+    with closing(kind_of(place).open_journal(place, Which())) as journal:  # converts nothing
+        assert [event for _, event in journal.take(offset=OFFSET)] == [submitted(1)]
+    with opened(place) as store:
+        assert [task.id for task in loaded(store).tasks] == [1]
+    with tables(place) as file:
+        file.execute(older)
+    with pytest.raises(StoreError, match=r"by an old version .*: open it once with a version"):
+        opened(place).__enter__()
+
+
 def test_every_event_comes_back_as_it_was(place: str) -> None:
     """Each value of each kind: enums are enums, floats are floats, times are times."""
     found: list[Any] = []
@@ -266,40 +295,6 @@ def test_a_stuck_disk_is_given_up_in_the_end(place: str) -> None:
     with opened(place) as store:
         found = loaded(store)
         assert (found.tasks, found.ended_well) == ((), False)
-
-
-#: of the first version: what its files and databases had
-FIRST_FILE = """
-PRAGMA application_id = 1297503315; PRAGMA user_version = 1;
-CREATE TABLE meta (one INTEGER PRIMARY KEY CHECK (one = 1), next_id INTEGER NOT NULL,
- last_number INTEGER NOT NULL, last_write REAL, ended_well INTEGER NOT NULL);
-INSERT INTO meta VALUES (1, 1, 0, NULL, 1);
-CREATE TABLE formats (id INTEGER PRIMARY KEY, names TEXT NOT NULL UNIQUE);
-CREATE TABLE tasks (id INTEGER PRIMARY KEY, number INTEGER NOT NULL, vehicle INTEGER NOT NULL,
- state INTEGER NOT NULL, changed_at REAL NOT NULL, submitted TEXT NOT NULL, changed TEXT,
- modified TEXT);
-CREATE INDEX finished ON tasks (changed_at) WHERE state >= 9;
-CREATE TABLE journal (number INTEGER PRIMARY KEY, utc REAL NOT NULL, kind TEXT NOT NULL,
- task_id INTEGER, vehicle INTEGER, body TEXT NOT NULL);
-CREATE INDEX of_task ON journal (task_id) WHERE task_id IS NOT NULL;
-CREATE TABLE vehicles (vehicle INTEGER PRIMARY KEY, paused INTEGER, uid TEXT, speed REAL)
-"""
-
-
-def test_a_file_of_the_first_version_is_read_and_brought_up_to_date(tmp_path: Path) -> None:
-    place = str(tmp_path / "folder" / "tasks.sqlite3")
-    Path(place).parent.mkdir()
-    with tables(place) as connection:
-        for statement in FIRST_FILE.split(";"):
-            connection.execute(statement)
-        with closing(kind_of(place).open_journal(place, Which())) as journal:
-            assert list(journal.take(offset=OFFSET)) == []
-        assert connection.execute("PRAGMA user_version").fetchone() == (1,)
-        with opened(place) as store:
-            store.append([submitted(1), QueuePaused(1, R.STOPPED, "client", 1.0)])
-        with opened(place) as store:
-            found = loaded(store)
-    assert ([task.id for task in found.tasks], found.paused) == ([1], {1: R.STOPPED})
 
 
 def test_a_task_of_a_version_with_fewer_fields_is_read(tmp_path: Path) -> None:
