@@ -10,6 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     __version__: str
+    from mav_tasks.basics.errors import ClientError as ClientError
+    from mav_tasks.basics.errors import MavTasksError as MavTasksError
+    from mav_tasks.basics.errors import NoAnswer as NoAnswer
+    from mav_tasks.basics.errors import NoSuchVehicle as NoSuchVehicle
+    from mav_tasks.basics.errors import Refused as Refused
+    from mav_tasks.basics.errors import TaskFailed as TaskFailed
+    from mav_tasks.basics.errors import UsageError as UsageError
     from mav_tasks.client.aio import Client as Client
     from mav_tasks.client.handle import Task as Task
     from mav_tasks.client.sync import SyncClient as SyncClient
@@ -19,13 +26,6 @@ if TYPE_CHECKING:
     from mav_tasks.client.values import TaskTiming as TaskTiming
     from mav_tasks.client.values import Text as Text
     from mav_tasks.client.values import VehicleStatus as VehicleStatus
-    from mav_tasks.errors import ClientError as ClientError
-    from mav_tasks.errors import MavTasksError as MavTasksError
-    from mav_tasks.errors import NoAnswer as NoAnswer
-    from mav_tasks.errors import NoSuchVehicle as NoSuchVehicle
-    from mav_tasks.errors import Refused as Refused
-    from mav_tasks.errors import TaskFailed as TaskFailed
-    from mav_tasks.errors import UsageError as UsageError
     from mav_tasks.kinds import Act as Act
     from mav_tasks.kinds import Drive as Drive
     from mav_tasks.kinds import Face as Face
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from mav_tasks.kinds import Rotate as Rotate
     from mav_tasks.kinds import Wait as Wait
     from mav_tasks.mavlink.signing import Key as Key
-    from mav_tasks.plan_files import read_plan as read_plan
-    from mav_tasks.plan_files import write_plan as write_plan
+    from mav_tasks.plans import read_plan as read_plan
+    from mav_tasks.plans import write_plan as write_plan
     from mav_tasks.tasks.lifecycle import TaskReason as TaskReason
     from mav_tasks.tasks.lifecycle import TaskState as TaskState
 
@@ -46,11 +46,11 @@ _HOMES = {
     "mav_tasks.client.handle": "Task",
     "mav_tasks.client.sync": "SyncClient SyncTask",
     "mav_tasks.client.values": "QueueStatus TaskStatus TaskTiming Text VehicleStatus",
-    "mav_tasks.errors": (
+    "mav_tasks.basics.errors": (
         "ClientError MavTasksError NoAnswer NoSuchVehicle Refused TaskFailed UsageError"
     ),
     "mav_tasks.mavlink.signing": "Key",
-    "mav_tasks.plan_files": "read_plan write_plan",
+    "mav_tasks.plans": "read_plan write_plan",
     "mav_tasks.kinds": "Act Drive Face GlobalPlace GoTo LocalPlace Move Rotate Wait",
     "mav_tasks.tasks.lifecycle": "TaskReason TaskState",
 }

@@ -30,7 +30,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-CORE = ("engine", "services", "tasks")
+CORE = ("engine", "tasks")
 #: tests that only compute: tools/test runs the others beside them
 LEFT_OUT = (
     *("browser", "e2e", "interop", "test_documents.py", "sim", "unit/fleet_io"),

@@ -3,7 +3,7 @@
 import sys
 
 from generated import keep_current
-from mav_tasks.services.parameter_table import NAMES, PARAMETERS, Parameter
+from mav_tasks.config.parameter_table import NAMES, PARAMETERS, Parameter
 
 HEAD = "| parameter | key | range | unit | what it sets |\n|---|---|---|---|---|\n"
 

@@ -9,11 +9,11 @@ from dataclasses import replace
 from itertools import chain
 
 from generated import keep_current
+from mav_tasks.config.settings import ROLES
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.policy import commands as of_commands
 from mav_tasks.engine.policy import messages as of_messages
 from mav_tasks.engine.policy.commands import UNKNOWN
-from mav_tasks.settings import ROLES
 
 KINDS = list(Kind)
 QUIET = (Kind.QUESTION, Kind.TELL)  # they change nothing

@@ -18,9 +18,9 @@ from mav_tasks.client.parts import (
     LABEL,
     PRIORITY,
 )
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Items, Number
 from mav_tasks.kinds.in_json import goal_schema
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Items, Number
 
 SOON = Number(0, 30 * 86_400, "s")
 SUBMISSION = (

@@ -17,9 +17,9 @@ from typing import Any, Literal, NamedTuple
 from mav_tasks.agents.advice import advice_of
 from mav_tasks.agents.forms import result, task_form
 from mav_tasks.agents.rovers import Rovers
+from mav_tasks.basics.errors import Refused, UsageError
 from mav_tasks.client.descriptions import needs_decision, state_of, what_of, why_of
 from mav_tasks.client.values import TaskStatus
-from mav_tasks.errors import Refused, UsageError
 from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 

@@ -10,7 +10,7 @@ from mcp_types import INTERNAL_ERROR, INVALID_PARAMS, RequestParams
 from mcp_types.version import MODERN_PROTOCOL_VERSIONS
 
 from mav_tasks.agents.durable import EXTENSION, Durable
-from mav_tasks.errors import ClientError, NoAnswer, UsageError
+from mav_tasks.basics.errors import ClientError, NoAnswer, UsageError
 
 
 class TaskParams(RequestParams):

@@ -8,7 +8,15 @@ from mav_tasks.agents.advice import advice_of, advice_on_queue
 from mav_tasks.client import json_form
 from mav_tasks.client.json_form import queue_json, task_json
 from mav_tasks.client.values import QueueStatus, TaskStatus
-from mav_tasks.setting_keys.schema import FLAG, TEXT, Schema, an_object, listed, or_null, said
+from mav_tasks.config.setting_keys.schema import (
+    FLAG,
+    TEXT,
+    Schema,
+    an_object,
+    listed,
+    or_null,
+    said,
+)
 
 #: parts of tasks, queues and rovers that agents are told of in advance: each word costs them
 OF_A_TASK = "id vehicle what label state why progress time_to_start time_to_finish halt_epoch"

@@ -18,9 +18,9 @@ from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json, vehicle_json
 from mav_tasks.client.parts import TASK_ID, VEHICLE_ID
 from mav_tasks.client.values import TaskStatus
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.schema import an_object, listed
-from mav_tasks.setting_keys.shapes import Number
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.schema import an_object, listed
+from mav_tasks.config.setting_keys.shapes import Number
 
 LONGEST_WAIT = 300  # s
 USUAL_WAIT = 30  # s; many programs of agents end a call after a minute

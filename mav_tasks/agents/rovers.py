@@ -4,11 +4,11 @@ The server may be down at the start or later. Each call looks for it, and raises
 not answer.
 """
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.telemetry import all_show
 from mav_tasks.client.values import TaskStatus, VehicleStatus
-from mav_tasks.errors import UsageError
 
 
 class Rovers:

@@ -25,8 +25,8 @@ from mav_tasks.agents.forms import refusal, result
 from mav_tasks.agents.reading import READING
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Tool
-from mav_tasks.errors import ClientError, UsageError
-from mav_tasks.setting_keys.parts import read_all, schema_of
+from mav_tasks.basics.errors import ClientError, UsageError
+from mav_tasks.config.setting_keys.parts import read_all, schema_of
 
 INSTRUCTIONS = """\
 Rovers that drive on the ground, and their queues of tasks. Read vehicles and queue first. Submit \

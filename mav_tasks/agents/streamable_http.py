@@ -14,8 +14,8 @@ from mcp.server.lowlevel import Server
 from mcp.server.transport_security import TransportSecuritySettings
 
 from mav_tasks.agents.http_sessions import HttpSessions
-from mav_tasks.errors import LinkOpenError, UsageError, reason_of
-from mav_tasks.http_connections import (
+from mav_tasks.basics.errors import LinkOpenError, UsageError, reason_of
+from mav_tasks.shell.http_connections import (
     HttpLimits,
     HttpServer,
     allow_files,

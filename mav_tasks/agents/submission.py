@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from mav_tasks.agents.rovers import Rovers
+from mav_tasks.basics.errors import NoAnswer, Refused, UsageError
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
 from mav_tasks.client.idempotency import Numbers, numbers_of
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.client.wire import Goal
-from mav_tasks.errors import NoAnswer, Refused, UsageError
 from mav_tasks.kinds.in_json import goals_of
 from mav_tasks.tasks.deduplicator import NONCE_KEPT
 from mav_tasks.tasks.lifecycle import TERMINAL

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mav_tasks.agents.rovers import Rovers
-from mav_tasks.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.parts import Part
 
 Values = dict[str, Any]  # of all arguments; None: not given
 #: takes the part that is done, 0 to 1, and what happens

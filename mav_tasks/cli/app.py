@@ -77,7 +77,7 @@ def _leave(status: object) -> None:
 
     Return where an ordinary end is needed: for the server, or if the output cannot be written.
     """
-    if "mav_tasks.serve" in sys.modules or not isinstance(status, int | None):
+    if "mav_tasks.shell.serve" in sys.modules or not isinstance(status, int | None):
         return
     try:
         sys.stdout.flush()

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.basics.errors import StoreError, UsageError
 from mav_tasks.cli.lazy import group
 from mav_tasks.config import configuration, report, toml_file
 from mav_tasks.config.configuration import Sources
 from mav_tasks.config.sample import sample
-from mav_tasks.errors import StoreError, UsageError
-from mav_tasks.settings import KEYS, ServerSettings
+from mav_tasks.config.settings import KEYS, ServerSettings
 from mav_tasks.store.opening import kind_of
 
 app = group("Show, check and create the configuration of the server.")

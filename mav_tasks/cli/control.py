@@ -5,6 +5,7 @@ from typing import Annotated, get_args
 
 import typer
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.lazy import completing
@@ -23,7 +24,6 @@ from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
 from mav_tasks.client.handle import Release
-from mav_tasks.errors import UsageError
 
 RELEASED = {
     "again": "released, restarts from here",

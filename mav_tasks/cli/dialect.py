@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.mavlink.definitions import DIALECT, folder_of_definitions
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, NamedTuple
 
 import typer
 
+from mav_tasks.basics.errors import ClientError, StoreError, UsageError
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.exit_codes import FAILED
@@ -20,12 +21,11 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import why_of
 from mav_tasks.client.telemetry import all_show
 from mav_tasks.config.configuration import Sources
-from mav_tasks.errors import ClientError, StoreError, UsageError
-from mav_tasks.key_ring.ring_file import load, path_of_ring
-from mav_tasks.link_keys import check_keys
+from mav_tasks.config.key_ring.ring_file import load, path_of_ring
+from mav_tasks.config.link_keys import check_keys
+from mav_tasks.config.settings import Links, ServerSettings
 from mav_tasks.links.config_check import ConfiguredLink, links_of
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
-from mav_tasks.settings import Links, ServerSettings
 from mav_tasks.store.latest import latest_store
 from mav_tasks.store.opening import kind_of
 from mav_tasks.store.sqlite import path_of

@@ -6,7 +6,7 @@ Only this module turns an error into a message for the operator: one line on sta
 import os
 import sys
 
-from mav_tasks.errors import (
+from mav_tasks.basics.errors import (
     ClientError,
     NoAnswer,
     NoSuchVehicle,
@@ -49,7 +49,7 @@ def tell(error: BaseException) -> int:
         case NoSuchVehicle():
             _say(f"{error} (--vehicle N)")
         case Refused() | TaskFailed():
-            from mav_tasks.logs.rendering import in_commands  # noqa: PLC0415  # takes long
+            from mav_tasks.store.rendering import in_commands  # noqa: PLC0415  # takes long
 
             _say("\n".join(map(in_commands, str(error).splitlines())))
         case _:

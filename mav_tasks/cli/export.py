@@ -8,11 +8,11 @@ from typing import Annotated, BinaryIO
 
 import typer
 
+from mav_tasks.basics.errors import UsageError, missing
+from mav_tasks.basics.whole_file import replacing
 from mav_tasks.cli import output
 from mav_tasks.cli.options import Json
-from mav_tasks.errors import UsageError, missing
-from mav_tasks.mcap_export.convention import RAW
-from mav_tasks.whole_file import replacing
+from mav_tasks.recording.mcap_export.convention import RAW
 
 PRIVATE = 0o600  # as the recordings are
 
@@ -30,7 +30,7 @@ def export(
     Reads what serve --tlog and serve --record write. Needs the extra mcap.
     """
     try:
-        from mav_tasks.mcap_export.exporting import export as export_recordings  # noqa: PLC0415
+        from mav_tasks.recording.mcap_export.exporting import export as export_recordings  # noqa: PLC0415
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] != "mcap":
             raise

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.basics.errors import ClientError, NoAnswer, Refused, UsageError
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
@@ -15,7 +16,6 @@ from mav_tasks.cli.session import is_alone, opened, unfound
 from mav_tasks.cli.words import described, every_of, line_of, resume_command
 from mav_tasks.client.aio import Client
 from mav_tasks.client.values import TaskStatus
-from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
 LOOKED_AT = 32  # finished tasks of a rover

@@ -11,15 +11,15 @@ from typing import Annotated, Any
 
 import typer
 
+from mav_tasks.basics.errors import KeyRingError, UsageError
 from mav_tasks.cli import output
 from mav_tasks.cli.lazy import completing, group
 from mav_tasks.cli.options import Json, RingFile
 from mav_tasks.cli.ring import ring_path
-from mav_tasks.errors import KeyRingError, UsageError
-from mav_tasks.key_ring import derivation as how
-from mav_tasks.key_ring.limits import LIMITS, limits_in_words, limits_of, plain_limits
-from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
-from mav_tasks.key_ring.ring_file import change, load
+from mav_tasks.config.key_ring import derivation as how
+from mav_tasks.config.key_ring.limits import LIMITS, limits_in_words, limits_of, plain_limits
+from mav_tasks.config.key_ring.ring import Entry, KeyRing, key_of
+from mav_tasks.config.key_ring.ring_file import change, load
 
 app = group("Add, list and revoke signing keys.")
 LONGEST = 4096  # characters of a passphrase that are read
@@ -41,7 +41,7 @@ def add(
         str,
         typer.Option(
             metavar="ROLE",
-            autocompletion=completing("mav_tasks.key_ring.ring:KINDS"),
+            autocompletion=completing("mav_tasks.config.key_ring.ring:KINDS"),
             help="Role of the client: observer, submitter, operator or safety; "
             "or vehicle, for the link to a rover.",
         ),
@@ -55,7 +55,7 @@ def add(
         str | None,
         typer.Option(
             metavar="HOW",
-            autocompletion=completing("mav_tasks.key_ring.derivation:PASSPHRASES"),
+            autocompletion=completing("mav_tasks.config.key_ring.derivation:PASSPHRASES"),
             help="How the key is derived from the passphrase: sha256 (default; QGroundControl 5.0, "
             "MAVProxy) or pbkdf2 (later QGroundControl).",
         ),

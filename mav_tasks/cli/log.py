@@ -10,12 +10,12 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.basics.errors import StoreError, UsageError
 from mav_tasks.cli import output
 from mav_tasks.cli.options import Json
 from mav_tasks.config.configuration import Sources
-from mav_tasks.errors import StoreError, UsageError
-from mav_tasks.logs import export
-from mav_tasks.logs.export import LinesOf
+from mav_tasks.shell.logs import export
+from mav_tasks.shell.logs.export import LinesOf
 from mav_tasks.store.base import JournalReader, Which
 from mav_tasks.store.latest import latest_store
 from mav_tasks.store.opening import kind_of

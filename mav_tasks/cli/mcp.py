@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
+from mav_tasks.basics.errors import UsageError, missing
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Reach
 from mav_tasks.cli.session import signing_key, unfound
-from mav_tasks.errors import UsageError, missing
 from mav_tasks.kinds.in_json import PLUGGED
 
 
@@ -63,7 +63,7 @@ async def mcp(reach: Reach, options: AgentOptions) -> None:
     from mav_tasks.agents.server import server_of  # noqa: PLC0415
     from mav_tasks.agents.stdio import serve_stdio  # noqa: PLC0415
     from mav_tasks.agents.streamable_http import place_of, serve_http  # noqa: PLC0415
-    from mav_tasks.key_ring.limits import limits_in_words  # noqa: PLC0415
+    from mav_tasks.config.key_ring.limits import limits_in_words  # noqa: PLC0415
 
     output.warn(PLUGGED.broken)
     place = place_of(options.http) if options.http else None

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli.lazy import completing
 from mav_tasks.cli.times import parse_duration, parse_moment
-from mav_tasks.errors import UsageError
 from mav_tasks.tasks.task import ANY
 
 DEFAULT_SERVER = "udpout:127.0.0.1:14560"

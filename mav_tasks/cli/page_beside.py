@@ -12,10 +12,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
+from mav_tasks.config.settings import ServerSettings
 from mav_tasks.links.config_check import links_of
 from mav_tasks.links.endpoint import HostUrl
-from mav_tasks.settings import ServerSettings
 from mav_tasks.store.opening import IN_MEMORY
 from mav_tasks.store.sqlite import path_of
 

@@ -2,7 +2,7 @@
 
 from math import hypot
 
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.kinds import GlobalPlace, LocalPlace, Place
 
 #: m; numbers of a place farther from the origin may be degrees

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.basics.errors import Refused, UsageError
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import AnyCommon, Common, TaskOptions, Wait
 from mav_tasks.cli.session import ChoiceHeard, opened, read, rover_of, values_checked
 from mav_tasks.cli.submit import tell_submitted
-from mav_tasks.errors import Refused, UsageError
-from mav_tasks.plan_files import PlanFile, format_plan, read_plan, write_plan
+from mav_tasks.plans import PlanFile, format_plan, read_plan, write_plan
 from mav_tasks.tasks.task import ANY
 
 STANDARD_OUTPUT = "-"

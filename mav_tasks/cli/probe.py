@@ -6,17 +6,17 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.basics.errors import ConfigError, NoAnswer, UsageError
 from mav_tasks.cli import output as out
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import DEFAULT_SERVER, RingFile
 from mav_tasks.cli.ring import key_to_sign_with
 from mav_tasks.config import profiles
-from mav_tasks.errors import ConfigError, NoAnswer, UsageError
 from mav_tasks.probe import report
 from mav_tasks.probe.failsafe import NotSet
 from mav_tasks.probe.probe import NothingHeard, Occupied, Options, Probe
+from mav_tasks.probe.probing import run_probe
 from mav_tasks.probe.profile import profile_of, why_none
-from mav_tasks.probing import run_probe
 
 QUESTION = """\
 This arms the rover and drives it at up to {speed:g} m/s, within 1 m of its place, or 4 m and more

@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 from platformdirs import user_documents_path
 
-from mav_tasks import qgc_actions as files
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
+from mav_tasks.plans import qgc_actions as files
 
 
 def qgc_actions(

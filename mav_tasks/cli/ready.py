@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.basics.errors import Refused
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
@@ -12,7 +13,6 @@ from mav_tasks.cli.session import opened
 from mav_tasks.client.json_form import vehicle_json
 from mav_tasks.client.telemetry import all_show
 from mav_tasks.client.values import VehicleStatus
-from mav_tasks.errors import Refused
 
 WITHIN = 2.0  # s to wait for an answer
 

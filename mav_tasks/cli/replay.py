@@ -8,7 +8,7 @@ import typer
 
 from mav_tasks.cli import exit_codes
 from mav_tasks.cli.options import Json
-from mav_tasks.key_ring.ring_file import load, path_of_ring
+from mav_tasks.config.key_ring.ring_file import load, path_of_ring
 from mav_tasks.recording.reading import read
 from mav_tasks.recording.replay import Replay
 from mav_tasks.recording.report import Report

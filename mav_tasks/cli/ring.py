@@ -3,9 +3,9 @@
 import os
 from pathlib import Path
 
+from mav_tasks.basics.errors import KeyRingError, MavTasksError
 from mav_tasks.config.configuration import Sources
-from mav_tasks.errors import KeyRingError, MavTasksError
-from mav_tasks.key_ring.ring_file import load, path_of_ring
+from mav_tasks.config.key_ring.ring_file import load, path_of_ring
 from mav_tasks.mavlink.signing import Key
 
 

@@ -9,11 +9,11 @@ from typer.core import TyperCommand, TyperOption
 
 from mav_tasks.cli.lazy import beginning_with, completing
 from mav_tasks.cli.options import DEFAULT_LISTEN
+from mav_tasks.config.setting_keys.key import Key, Option
+from mav_tasks.config.setting_keys.literals import literal
+from mav_tasks.config.setting_keys.shapes import Choice, Texts
+from mav_tasks.config.settings import KEYS, ServerSettings
 from mav_tasks.config.words import Flag
-from mav_tasks.setting_keys.key import Key, Option
-from mav_tasks.setting_keys.literals import literal
-from mav_tasks.setting_keys.shapes import Choice, Texts
-from mav_tasks.settings import KEYS, ServerSettings
 
 
 class ServeCommand(TyperCommand):

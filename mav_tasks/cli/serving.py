@@ -4,12 +4,12 @@ import os
 from collections.abc import Sequence
 from contextlib import nullcontext
 
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.cli.page_beside import page_beside
 from mav_tasks.config.configuration import Sources
 from mav_tasks.config.reload import Reload
 from mav_tasks.config.words import Flag, flag_of_set
-from mav_tasks.errors import StoreError
-from mav_tasks.serve import serve
+from mav_tasks.shell.serve import serve
 from mav_tasks.store.opening import IN_MEMORY
 
 

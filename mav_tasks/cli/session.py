@@ -4,12 +4,12 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any, Literal
 
+from mav_tasks.basics.errors import LinkDown, NoAnswer, UsageError
 from mav_tasks.cli import output
 from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import News, Text
-from mav_tasks.errors import LinkDown, NoAnswer, UsageError
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.tasks.task import ANY
 

@@ -2,6 +2,7 @@
 
 from datetime import datetime
 
+from mav_tasks.basics.errors import Refused
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common, TaskId, Wait
@@ -12,7 +13,6 @@ from mav_tasks.client.descriptions import end_of, state_of, what_of
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json, timing_json
 from mav_tasks.client.values import TaskStatus, TaskTiming
-from mav_tasks.errors import Refused
 from mav_tasks.mavlink.address import who_is
 
 

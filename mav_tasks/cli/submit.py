@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mav_tasks.basics.errors import ClientError, SettingError
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
 from mav_tasks.cli.lazy import completing, group
@@ -19,11 +20,10 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json
 from mav_tasks.client.wire import Goal
-from mav_tasks.errors import ClientError, SettingError
+from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.kinds import GoTo
 from mav_tasks.kinds.form import Form
 from mav_tasks.kinds.in_json import FORMS, GOTO, GOTO_GLOBAL, PLUGGED, made_of
-from mav_tasks.setting_keys.parts import Part
 
 EPILOG = """\b
 Examples:

@@ -3,7 +3,7 @@
 import re
 from datetime import datetime, time, timedelta, tzinfo
 
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 DURATION = re.compile(rf"(?:{_NUMBER}d)?(?:{_NUMBER}h)?(?:{_NUMBER}m)?(?:{_NUMBER}s?)?", re.ASCII)

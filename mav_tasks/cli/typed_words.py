@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from mav_tasks.errors import Refused
+from mav_tasks.basics.errors import Refused
 
 PLACE = re.compile(r"^(.*?)item \d+ is ")
 ITEM = re.compile(r"^(.*?)item \d+: ")

@@ -8,6 +8,7 @@ from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
+from mav_tasks.basics.errors import NoAnswer
 from mav_tasks.cli import output
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.queue import fetch, show
@@ -16,7 +17,6 @@ from mav_tasks.cli.tables import queue_table
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
 from mav_tasks.client.values import QueueStatus
-from mav_tasks.errors import NoAnswer
 
 PERIOD = 1.0  # s between two requests
 OLD = 2.5  # s without an answer, after which the view says so

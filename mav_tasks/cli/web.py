@@ -5,14 +5,14 @@ from typing import Annotated, Any
 
 import typer
 
+from mav_tasks.basics.errors import UsageError, missing
+from mav_tasks.basics.folders import at_home
 from mav_tasks.cli import output
 from mav_tasks.cli.options import DEFAULT_LISTEN, DEFAULT_SERVER, RingFile, Server, SignWith
 from mav_tasks.cli.page_beside import end_with_input
 from mav_tasks.cli.ring import key_to_sign_with, ring_path
-from mav_tasks.errors import UsageError, missing
-from mav_tasks.folders import at_home
-from mav_tasks.key_ring.ring_file import load
-from mav_tasks.key_ring.watch import RingWatch
+from mav_tasks.config.key_ring.ring_file import load
+from mav_tasks.config.key_ring.watch import RingWatch
 from mav_tasks.kinds.in_json import PLUGGED
 
 app = typer.Typer(rich_markup_mode=None)  # without a command it serves

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, Self, Unpack
 from weakref import WeakValueDictionary
 
-from mav_tasks import plan_files
+from mav_tasks import plans as plan_files
+from mav_tasks.basics.errors import ClientError, LinkDown, MavTasksError, NoAnswer, Refused
 from mav_tasks.client import wire
 from mav_tasks.client.asker import Asker
 from mav_tasks.client.connection import Connection
@@ -31,7 +32,7 @@ from mav_tasks.client.values import (
 )
 from mav_tasks.client.watch import Followed
 from mav_tasks.client.wire import SERVER, Goal, TaskOptions
-from mav_tasks.errors import ClientError, LinkDown, MavTasksError, NoAnswer, Refused
+from mav_tasks.engine.services.missions import Item
 from mav_tasks.kinds import Drive, Move, Rotate
 from mav_tasks.kinds.sent import check_size
 from mav_tasks.links.base import Link
@@ -46,12 +47,11 @@ from mav_tasks.mavlink.enums import (
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.mavlink.label import check_label, text_pieces
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.plan_files import (
+from mav_tasks.plans import (
     PlanFile,
     fence_items,
     rally_items,
 )
-from mav_tasks.services.missions import Item
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 

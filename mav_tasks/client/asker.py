@@ -6,6 +6,7 @@ from contextlib import contextmanager, suppress
 from math import inf
 from typing import Any, TypeVar
 
+from mav_tasks.basics.errors import ClientError, NoAnswer, Refused
 from mav_tasks.client.calls import AGAIN, Call, Command
 from mav_tasks.client.connection import Connection
 from mav_tasks.client.session import WORDS_WITHIN, Answer, Reply, request_message
@@ -18,12 +19,11 @@ from mav_tasks.client.values import (
     VehicleChanged,
     queue_status_of,
 )
-from mav_tasks.errors import ClientError, NoAnswer, Refused
+from mav_tasks.engine.services.missions import Item, message_of
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.mavlink.float_param import to_param
-from mav_tasks.services.missions import Item, message_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
 T = TypeVar("T")

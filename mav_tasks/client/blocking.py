@@ -10,10 +10,10 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import suppress
 from typing import Any, Protocol, Self, TypeVar
 
+from mav_tasks.basics.errors import ClientError, MavTasksError
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import TaskStatus
-from mav_tasks.errors import ClientError, MavTasksError
 
 T = TypeVar("T")
 

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from mav_tasks.engine.services.retry import Retry
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavResult
-from mav_tasks.services.retry import Retry
 
 AGAIN = 0.5  # s between copies; the server answers within that time
 LATE = 0.6  # s for which acks of further copies may still arrive

@@ -3,11 +3,11 @@
 import asyncio
 from collections.abc import Callable
 
+from mav_tasks.basics.errors import LinkUrlError
 from mav_tasks.client.calls import Call
 from mav_tasks.client.link_driver import LinkDriver
 from mav_tasks.client.session import Session
 from mav_tasks.client.signatures import ClientSignatures
-from mav_tasks.errors import LinkUrlError
 from mav_tasks.links.base import Link
 from mav_tasks.links.link_limits import TO_CLIENTS
 from mav_tasks.links.url import parse_url

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Number
 from mav_tasks.kinds.goto import ON_EARTH
-from mav_tasks.plan_files import FenceCircle, FencePolygon, PlanFile
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Number
+from mav_tasks.plans import FenceCircle, FencePolygon, PlanFile
 
 DEGREE = 1e7  # of MAVLink's integers
 CIRCLE = (*ON_EARTH, Part("radius", Number(0.1, 100_000.0, "m"), "radius", True))

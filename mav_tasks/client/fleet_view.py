@@ -4,15 +4,15 @@ from collections.abc import Iterator, Sequence
 from math import hypot
 from typing import Any
 
+from mav_tasks.basics.errors import NoSuchVehicle
 from mav_tasks.client.values import VehicleStatus, known
-from mav_tasks.errors import NoSuchVehicle
+from mav_tasks.engine.services.persona import Persona, persona_of
+from mav_tasks.engine.services.vehicle_status import HeartbeatMonitor, charge_of, passes_checks
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.persona import Persona, persona_of
-from mav_tasks.services.vehicle_status import HeartbeatMonitor, charge_of, passes_checks
 
 SILENT_AFTER = 3.5  # s without a heartbeat; same as in the server
 GAP = 1.7  # s without a heartbeat, after which the server may be another process

@@ -4,10 +4,10 @@ import asyncio
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Literal, Unpack
 
+from mav_tasks.basics.errors import ClientError, TaskFailed
 from mav_tasks.client.terms import Changes
 from mav_tasks.client.values import TaskStatus, TaskTiming
 from mav_tasks.client.watch import Followed
-from mav_tasks.errors import ClientError, TaskFailed
 from mav_tasks.tasks.lifecycle import TaskState, words_of
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Any
 
 from mav_tasks.client.descriptions import end_of, left, state_of, waits_of, what_of
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, VehicleStatus
-from mav_tasks.setting_keys.schema import (
+from mav_tasks.config.setting_keys.schema import (
     FLAG,
     INTEGER,
     NUMBER,

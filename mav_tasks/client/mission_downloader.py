@@ -6,10 +6,10 @@ MAVLink guide, "Mission Protocol", "Download a Mission from the Vehicle". One pl
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from mav_tasks.engine.services.missions import Item, item_of
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
-from mav_tasks.services.missions import Item, item_of
 
 ASK_AGAIN = 0.3  # s, for the list or an item
 GIVE_UP = 4.0  # s without anything that was asked for

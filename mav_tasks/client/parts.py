@@ -1,10 +1,10 @@
 """The parts of requests in JSON, for the HTTP API and agents: each declared once. Pure."""
 
 from mav_tasks.client.idempotency import LONGEST
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Choice, Items, Number, Text
 from mav_tasks.kinds.in_json import goal_schema
 from mav_tasks.mavlink.label import MAX_LABEL
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Choice, Items, Number, Text
 from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, MIN_PERIOD
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID
 

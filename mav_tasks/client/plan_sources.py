@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from mav_tasks import plan_files
+from mav_tasks import plans as plan_files
 from mav_tasks.client import wire
 from mav_tasks.client.wire import Goal
-from mav_tasks.plan_files import PlanFile
-from mav_tasks.services.missions import Item
+from mav_tasks.engine.services.missions import Item
+from mav_tasks.plans import PlanFile
 
 Plan = PlanFile | Sequence[Goal] | Path | str
 

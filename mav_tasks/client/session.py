@@ -27,15 +27,15 @@ from mav_tasks.client.values import (
 )
 from mav_tasks.client.watch import Followed, Watch
 from mav_tasks.client.wire import SERVER
+from mav_tasks.engine.services import statustext
+from mav_tasks.engine.services.statustext import TextReceiver
+from mav_tasks.engine.services.vehicle_status import HeartbeatSender, component_heartbeat
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavState
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import statustext
-from mav_tasks.services.statustext import TextReceiver
-from mav_tasks.services.vehicle_status import HeartbeatSender, component_heartbeat
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
 
 #: s within which the STATUSTEXT of a refusal follows its ack

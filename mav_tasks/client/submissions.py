@@ -3,8 +3,8 @@
 from datetime import UTC, datetime
 from random import SystemRandom
 
+from mav_tasks.basics.latest import keep_latest
 from mav_tasks.client import wire
-from mav_tasks.latest import keep_latest
 from mav_tasks.tasks.task import MAX_NONCE
 
 LATE_ACK = 3.0  # s for which a copy of an ack may still arrive

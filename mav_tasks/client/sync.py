@@ -15,10 +15,10 @@ from mav_tasks.client.session import TELEMETRY_RATE
 from mav_tasks.client.terms import Changes, Terms
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Text, VehicleStatus
 from mav_tasks.client.wire import Goal
+from mav_tasks.engine.services.missions import Item
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.plan_files import PlanFile
-from mav_tasks.services.missions import Item
+from mav_tasks.plans import PlanFile
 
 
 class SyncTask(BlockingTask):

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from math import inf
 
 from mav_tasks.client.mission_downloader import MissionDownloader
+from mav_tasks.engine.services.missions import Item, MissionUploader, Patience
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
-from mav_tasks.services.missions import Item, MissionUploader, Patience
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: the server gives up after 2.3 s without an item

@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
+from mav_tasks.engine.services.missions import Item
 from mav_tasks.kinds import Act, Drive, Face, GoTo, Move, Rotate, Wait
 from mav_tasks.kinds.sent import LARGEST, check_numbers, check_size
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import to_param
-from mav_tasks.plan_files.values import PlanItem
-from mav_tasks.services.missions import Item
+from mav_tasks.plans.values import PlanItem
 from mav_tasks.tasks.repetition import canonical
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_TASK_ID
 

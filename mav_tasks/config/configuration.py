@@ -6,13 +6,13 @@ from pathlib import Path
 
 from platformdirs import user_config_path
 
+from mav_tasks.basics.errors import ConfigError, LinkUrlError, SettingError
 from mav_tasks.config import profiles, toml_file, words
 from mav_tasks.config.given import Given, Layer, shown
-from mav_tasks.errors import ConfigError, LinkUrlError, SettingError
+from mav_tasks.config.setting_keys.key import check_bounds
+from mav_tasks.config.settings import BOUNDED, ServerSettings
 from mav_tasks.links.config_check import faults_of
 from mav_tasks.links.endpoint import parse_endpoint
-from mav_tasks.setting_keys.key import check_bounds
-from mav_tasks.settings import BOUNDED, ServerSettings
 
 FILE_NAME = "config.toml"
 

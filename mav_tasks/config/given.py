@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from enum import Enum
 
-from mav_tasks.errors import SettingError
-from mav_tasks.setting_keys.key import Key
-from mav_tasks.setting_keys.literals import literal
+from mav_tasks.basics.errors import SettingError
+from mav_tasks.config.setting_keys.key import Key
+from mav_tasks.config.setting_keys.literals import literal
 
 LONGEST = 60  # characters shown of a wrong value
 

@@ -8,13 +8,13 @@ from typing import Any
 
 from platformdirs import user_config_path
 
+from mav_tasks.basics.errors import ConfigError, SettingError
+from mav_tasks.basics.folders import make_private
+from mav_tasks.basics.whole_file import replace_whole
 from mav_tasks.config import toml_file
-from mav_tasks.errors import ConfigError, SettingError
-from mav_tasks.folders import make_private
-from mav_tasks.setting_keys.key import declared_in
-from mav_tasks.setting_keys.literals import literal
-from mav_tasks.settings import VehicleProfile
-from mav_tasks.whole_file import replace_whole
+from mav_tasks.config.setting_keys.key import declared_in
+from mav_tasks.config.setting_keys.literals import literal
+from mav_tasks.config.settings import VehicleProfile
 
 NONE = "none"
 SUFFIX = ".toml"

@@ -12,12 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import ConfigError, SettingError
 from mav_tasks.config.configuration import Configuration, Sources
-from mav_tasks.errors import ConfigError, SettingError
-from mav_tasks.services.parameter_table import NAMES
-from mav_tasks.setting_keys.key import Key, check_bounds
-from mav_tasks.setting_keys.literals import literal
-from mav_tasks.settings import BOUNDED, KEYS, ServerSettings, Settings
+from mav_tasks.config.parameter_table import NAMES
+from mav_tasks.config.setting_keys.key import Key, check_bounds
+from mav_tasks.config.setting_keys.literals import literal
+from mav_tasks.config.settings import BOUNDED, KEYS, ServerSettings, Settings
 
 log = logging.getLogger("mav_tasks")
 

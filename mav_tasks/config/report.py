@@ -4,12 +4,12 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.config.configuration import Configuration
 from mav_tasks.config.given import Source, suggestion
-from mav_tasks.errors import UsageError
-from mav_tasks.services.parameter_table import NAMES, with_all
-from mav_tasks.setting_keys.literals import literal
-from mav_tasks.settings import KEYS, TABLES
+from mav_tasks.config.parameter_table import NAMES, with_all
+from mav_tasks.config.setting_keys.literals import literal
+from mav_tasks.config.settings import KEYS, TABLES
 
 
 def chosen(names: Sequence[str]) -> list[str]:

@@ -3,10 +3,10 @@
 from itertools import groupby
 from textwrap import wrap
 
+from mav_tasks.config.setting_keys.key import Key
+from mav_tasks.config.setting_keys.literals import literal
+from mav_tasks.config.settings import KEYS, ServerSettings
 from mav_tasks.config.words import variable_of
-from mav_tasks.setting_keys.key import Key
-from mav_tasks.setting_keys.literals import literal
-from mav_tasks.settings import KEYS, ServerSettings
 
 WIDTH = 100
 OPENING = f"""\

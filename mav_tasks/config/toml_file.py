@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mav_tasks.basics.errors import ConfigError
 from mav_tasks.config import toml_lines
 from mav_tasks.config.given import Layer, Source, shown, suggestion
-from mav_tasks.errors import ConfigError
-from mav_tasks.setting_keys.literals import literal
-from mav_tasks.settings import KEYS, TABLES
+from mav_tasks.config.setting_keys.literals import literal
+from mav_tasks.config.settings import KEYS, TABLES
 
 LARGEST = 256_000  # bytes, maximum size of a file
 MOST_FAULTS = 50  # reported for one file

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mav_tasks.config.given import Layer, Source, shown, suggestion
-from mav_tasks.settings import KEYS
+from mav_tasks.config.settings import KEYS
 
 PREFIX = "MAV_TASKS_"
 FILE_VARIABLE = "MAV_TASKS_CONFIG"  # the configuration file; "" for none

@@ -15,8 +15,8 @@ from math import inf
 from operator import itemgetter
 from typing import NamedTuple, Protocol
 
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.timers import Effect, Timers, Turn
-from mav_tasks.errors import Rejection
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry

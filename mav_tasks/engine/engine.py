@@ -10,6 +10,8 @@ from math import inf
 from operator import attrgetter
 from typing import assert_never
 
+from mav_tasks.config.parameter_table import with_all
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine import inputs
 from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.elsewhere import Elsewhere
@@ -44,8 +46,6 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.sequence import RestartWatch
-from mav_tasks.services.parameter_table import with_all
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import SubmissionDeduplicator
 from mav_tasks.tasks.events import Event, ServerStopped, TaskSubmitted
 from mav_tasks.tasks.fleet import Fleet

@@ -6,9 +6,9 @@ Reading changes nothing. A vehicle's figures cost the same however many tasks it
 from dataclasses import dataclass
 from math import inf
 
+from mav_tasks.basics.histogram import Distribution
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.histogram import Distribution
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.forecast import tally
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState

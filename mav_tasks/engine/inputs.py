@@ -6,8 +6,8 @@ from enum import Enum, auto
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.restored import Restored
 

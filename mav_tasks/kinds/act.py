@@ -5,15 +5,15 @@ from math import isfinite
 from types import MappingProxyType
 from typing import ClassVar
 
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Name, Number
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import Leg, Took
 from mav_tasks.kinds.form import Form, any_number
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import LARGEST, Sent
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Name, Number
-from mav_tasks.settings import Driving
 
 #: of ``done``: the rover has been told, or is just about to be; it has accepted
 TOLD, ACCEPTED = 0.5, 1.0

@@ -4,10 +4,10 @@ from enum import Enum, auto
 from math import radians, sqrt
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
+from mav_tasks.config.settings import Driving, Turning
 from mav_tasks.kinds.guidance import ZERO, Situation, Velocity
 from mav_tasks.kinds.path import Spot, wrap
 from mav_tasks.kinds.places import Bend, LocalPlace, Pose
-from mav_tasks.settings import Driving, Turning
 
 #: the legs of a way to a place: face it (as a car: drive to where the last run to it begins),
 #: drive there; others may follow

@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from math import copysign, degrees
 from typing import ClassVar
 
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import Ability, Begun, Leg, Took, WhyNot, anchor_in
 from mav_tasks.kinds.form import DEGREE, DURATION, Form, any_number
 from mav_tasks.kinds.guidance import Situation, Velocity, towards
@@ -11,8 +13,6 @@ from mav_tasks.kinds.path import moved, wrap
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.settings import Driving
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from math import atan2, copysign, inf, sqrt
 from typing import ClassVar
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import OFF_TRACK, TURNED, Leg, Took, Unit, is_turned, ramped
 from mav_tasks.kinds.guidance import (
     MAX_APPROACH_ANGLE,
@@ -27,7 +28,6 @@ from mav_tasks.kinds.path import (
     wrap,
 )
 from mav_tasks.kinds.places import Pose
-from mav_tasks.settings import Driving
 
 #: m/s, limit for a bend that ends just before the path does. With 0.15 s of delay, 30 % overspeed
 #: and half the commanded curvature, a place is then reached within 6 cm (p95), otherwise 13 cm

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from math import radians
 from typing import Any
 
-from mav_tasks.setting_keys.parts import Part, schema_of
-from mav_tasks.setting_keys.shapes import LARGEST, Number
+from mav_tasks.config.setting_keys.parts import Part, schema_of
+from mav_tasks.config.setting_keys.shapes import LARGEST, Number
 
 DEGREE = radians(1)
 

@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from math import degrees, pi, tau
 from typing import Any, ClassVar
 
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Number
 from mav_tasks.kinds.base import FACE, WAY, Ability, Base, Begun, anchor_in
 from mav_tasks.kinds.follow import Follow
 from mav_tasks.kinds.form import DEGREE, HEADING, SPEED, Form, any_number, positive
@@ -14,8 +16,6 @@ from mav_tasks.kinds.rotate import Rotate, turn_to
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.kinds.wait import Wait
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Number
 
 E7 = 1e7  # degE7 of a degree: MAVLink's integers
 ON_THE_SPOT = 0.01  # m, acceptance radius if none is given

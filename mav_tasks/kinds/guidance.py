@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from math import copysign, hypot, inf, pi, sqrt, tan
 from typing import NamedTuple
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.path import wrap
 from mav_tasks.kinds.places import Pose
-from mav_tasks.settings import Driving
 
 APPROACH_GAIN = 1.2  # 1/s, in the last centimetres: speed = gain * remaining
 #: m/s, the least setpoint; half of it moved no ArduPilot reliably (its PWM is then 1500)

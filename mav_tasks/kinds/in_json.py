@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mav_tasks.errors import SettingError
+from mav_tasks.basics.errors import SettingError
+from mav_tasks.config.setting_keys.parts import read_all, shortened
 from mav_tasks.kinds import act, drive, goto, move, rotate, wait
 from mav_tasks.kinds.form import Form
 from mav_tasks.kinds.plugged import plugged
-from mav_tasks.setting_keys.parts import read_all, shortened
 
 ROTATE, FACE = rotate.FORMS
 GOTO, GOTO_GLOBAL, HOME = goto.FORMS

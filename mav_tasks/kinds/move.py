@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from math import atan, copysign, pi, radians
 from typing import ClassVar
 
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import (
     OFF_TRACK,
     ON_SPOT,
@@ -34,8 +36,6 @@ from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.rotate import Rotate
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.settings import Driving
 
 CROSS_TRACK_GAIN = 1.2  # 1/m, sideways error -> approach angle
 CONVERGES = 6.0  # m of line in which steering corrects one metre of cross-track error

@@ -11,10 +11,10 @@ from importlib.metadata import entry_points
 from keyword import iskeyword
 from typing import Any, NamedTuple
 
-from mav_tasks.errors import SettingError
+from mav_tasks.basics.errors import SettingError
+from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.kinds.base import Base
 from mav_tasks.kinds.form import Form
-from mav_tasks.setting_keys.parts import Part
 
 GROUP = "mav_tasks.kinds"
 #: names of options that each submission has on the command line

@@ -4,6 +4,9 @@ from dataclasses import dataclass, replace
 from math import copysign, degrees, pi, radians, tau
 from typing import ClassVar
 
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Number
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import (
     OFF_TRACK,
     ON_SPOT,
@@ -25,9 +28,6 @@ from mav_tasks.kinds.path import distance, wrap
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Number
-from mav_tasks.settings import Driving
 
 AHEAD = 0.5  # s by which the course leads the heading if a vehicle turns to it by itself
 LEAST_AHEAD = radians(10)  # rad, least lead

@@ -6,7 +6,7 @@
 from collections.abc import Iterator
 from typing import NamedTuple, Protocol
 
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.links.endpoint import is_loopback, parse_endpoint
 from mav_tasks.links.policy import LinkPolicy, Rules, Side, check, policy_of, unsigned_beyond
 from mav_tasks.links.udp import UdpUrl

@@ -4,7 +4,7 @@ import ipaddress
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from mav_tasks.errors import LinkUrlError
+from mav_tasks.basics.errors import LinkUrlError
 from mav_tasks.links.url import NO_OPTIONS, UrlOptions
 
 PORTS = range(1, 65_536)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from mav_tasks.errors import InsecureLinkError, UsageError
+from mav_tasks.basics.errors import InsecureLinkError, UsageError
 from mav_tasks.links.url import LinkUrl
 
 Side = Literal["clients", "vehicles"]

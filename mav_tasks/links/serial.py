@@ -15,8 +15,8 @@ from typing import ClassVar
 
 from serial import Serial, SerialException
 
-from mav_tasks.clock import boot_time
-from mav_tasks.errors import LinkOpenError, LinkUrlError
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.errors import LinkOpenError, LinkUrlError
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
 from mav_tasks.links.endpoint import number_in

@@ -7,8 +7,8 @@ come and go.
 import selectors
 import socket
 
-from mav_tasks.clock import boot_time
-from mav_tasks.errors import reason_of
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.errors import reason_of
 from mav_tasks.links.base import Peer, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl
 from mav_tasks.links.link_limits import LinkLimits

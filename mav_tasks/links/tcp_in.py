@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from itertools import islice
 from random import SystemRandom
 
-from mav_tasks.clock import boot_time
-from mav_tasks.crowd import first_of_crowd
-from mav_tasks.errors import LinkOpenError, reason_of
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.crowd import first_of_crowd
+from mav_tasks.basics.errors import LinkOpenError, reason_of
 from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits

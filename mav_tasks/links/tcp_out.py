@@ -5,7 +5,7 @@ import selectors
 import socket
 from time import monotonic
 
-from mav_tasks.errors import LinkOpenError, reason_of
+from mav_tasks.basics.errors import LinkOpenError, reason_of
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Link, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint

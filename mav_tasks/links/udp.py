@@ -3,7 +3,7 @@
 import socket
 from zlib import crc32
 
-from mav_tasks.errors import LinkOpenError, LinkUrlError, reason_of
+from mav_tasks.basics.errors import LinkOpenError, LinkUrlError, reason_of
 from mav_tasks.links.base import Link, Peer
 from mav_tasks.links.endpoint import PORTS, HostUrl, is_loopback, number_in, parse_endpoint
 from mav_tasks.links.link_limits import TO_VEHICLES, LinkLimits

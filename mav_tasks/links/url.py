@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import NamedTuple, Protocol, cast
 
-from mav_tasks.errors import LinkUrlError
+from mav_tasks.basics.errors import LinkUrlError
 from mav_tasks.links.base import Link
 from mav_tasks.links.link_limits import LinkLimits
 

@@ -9,7 +9,8 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
-from mav_tasks.clock import boot_time
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.histogram import Distribution, Histogram
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import (
     AtOnce,
@@ -24,7 +25,6 @@ from mav_tasks.engine.inputs import (
     Shutdown,
     StoreFailed,
 )
-from mav_tasks.histogram import Distribution, Histogram
 from mav_tasks.links.base import CountingLink, Link, ListeningLink
 from mav_tasks.metrics import families as f
 from mav_tasks.metrics.exposition import Family

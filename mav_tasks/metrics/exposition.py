@@ -11,7 +11,7 @@ from itertools import accumulate
 from math import inf, isnan
 from typing import Literal
 
-from mav_tasks.histogram import Distribution
+from mav_tasks.basics.histogram import Distribution
 
 #: of an HTTP answer with this text
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from threading import Thread
 
-from mav_tasks.errors import UsageError, reason_of
+from mav_tasks.basics.errors import UsageError, reason_of
 from mav_tasks.links.endpoint import is_loopback, parse_endpoint
 
 log = logging.getLogger("mav_tasks")

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from math import inf
 
+from mav_tasks.basics.histogram import Histogram
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import Outgoing
-from mav_tasks.histogram import Histogram
 from mav_tasks.mavlink.messages import SetPositionTargetLocalNed
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.tasks.events import Event, VehicleHalted

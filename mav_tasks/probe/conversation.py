@@ -2,6 +2,16 @@
 
 from collections import Counter
 
+from mav_tasks.config.settings import Watch
+from mav_tasks.engine.services.commands import CommandSender
+from mav_tasks.engine.services.offboard import OffboardControl, is_request_of
+from mav_tasks.engine.services.persona import Persona
+from mav_tasks.engine.services.statustext import TextReceiver
+from mav_tasks.engine.services.vehicle_status import (
+    HeartbeatMonitor,
+    HeartbeatSender,
+    gcs_heartbeat,
+)
 from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -10,12 +20,6 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.probe.other_traffic import SETPOINTS, OtherTraffic
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services.commands import CommandSender
-from mav_tasks.services.offboard import OffboardControl, is_request_of
-from mav_tasks.services.persona import Persona
-from mav_tasks.services.statustext import TextReceiver
-from mav_tasks.services.vehicle_status import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
-from mav_tasks.settings import Watch
 
 NO_ANSWER = "no answer"
 GIVE_UP = 1.0  # s, of a command that is not answered

@@ -6,6 +6,9 @@ the driving, zeros and HOLD follow, and it is disarmed if it was us who armed it
 
 from math import inf
 
+from mav_tasks.engine.services.offboard import OffboardControl, Refused
+from mav_tasks.engine.services.orders import STANDING, Speeds
+from mav_tasks.engine.services.persona import Persona
 from mav_tasks.kinds.guidance import Motion
 from mav_tasks.kinds.path import distance
 from mav_tasks.mavlink.enums import MavCmd
@@ -13,9 +16,6 @@ from mav_tasks.probe.conversation import Conversation
 from mav_tasks.probe.driving_area import DrivingArea
 from mav_tasks.probe.findings import Drive
 from mav_tasks.probe.steps import Steps, pause
-from mav_tasks.services.offboard import OffboardControl, Refused
-from mav_tasks.services.orders import STANDING, Speeds
-from mav_tasks.services.persona import Persona
 
 TAKE_WITHIN = 12.0  # s; PX4 takes four heartbeats
 STAND_WITHIN = 4.0  # s of zeros

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from math import cos, inf, sin
 
+from mav_tasks.config.settings import Turning
 from mav_tasks.kinds import Pose
 from mav_tasks.kinds.guidance import Motion
 from mav_tasks.kinds.path import cross_track, forward_of
-from mav_tasks.settings import Turning
 
 HALF = 1.0  # m, from the middle to each side: the area measures 2 m
 #: m, the same for one that steers as a car: it has to come out of its turning circle, of 1.5 m and

@@ -4,6 +4,7 @@ changes for good, and only when it is asked to.
 
 from struct import pack, unpack
 
+from mav_tasks.engine.services.loss_failsafe import STANDING, fault_in, what_it_does
 from mav_tasks.mavlink import messages as m
 from mav_tasks.probe.conversation import Conversation
 from mav_tasks.probe.findings import Findings
@@ -15,7 +16,6 @@ from mav_tasks.probe.parameters import (
     value_of,
 )
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services.loss_failsafe import STANDING, fault_in, what_it_does
 
 ASKS, ASK_AGAIN = 5, 0.5  # s
 

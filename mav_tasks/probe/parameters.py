@@ -6,13 +6,13 @@ MAVLink guide, "Parameter Protocol": an integer stands in a float by its bytes, 
 from math import isnan
 from struct import pack, unpack
 
+from mav_tasks.engine.services.loss_failsafe import AFTER, what_it_does
+from mav_tasks.engine.services.own_parameters import OwnParameters
+from mav_tasks.engine.services.persona import Persona
 from mav_tasks.mavlink import messages as m
 from mav_tasks.probe.conversation import Conversation
 from mav_tasks.probe.findings import Findings
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services.loss_failsafe import AFTER, what_it_does
-from mav_tasks.services.own_parameters import OwnParameters
-from mav_tasks.services.persona import Persona
 
 BYTEWISE = 16  # MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 FORMATS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}  # by MAV_PARAM_TYPE

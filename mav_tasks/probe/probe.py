@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from mav_tasks.config.settings import Identity, Turning, Watch
+from mav_tasks.engine.services.loss_failsafe import fault_in
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.probe.conversation import Conversation
@@ -20,8 +22,6 @@ from mav_tasks.probe.questions import (
 )
 from mav_tasks.probe.steps import Steps, Wait, Walk
 from mav_tasks.probe.trials import Trials
-from mav_tasks.services.loss_failsafe import fault_in
-from mav_tasks.settings import Identity, Turning, Watch
 
 FRESH_ENOUGH = 5.0  # Hz of position and attitude, below which it is not driven
 DRIVEN_TYPES = frozenset({10, 11})  # MAV_TYPE: ground rover, surface boat

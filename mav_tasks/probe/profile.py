@@ -1,7 +1,7 @@
 """The profile that follows from what a probe has found: what the server drives by."""
 
+from mav_tasks.config.settings import VehicleProfile
 from mav_tasks.probe.findings import Findings
-from mav_tasks.settings import VehicleProfile
 
 
 def why_none(findings: Findings) -> str:

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping
 
+from mav_tasks.engine.services.interval_requester import WANTED
+from mav_tasks.engine.services.persona import persona_of
+from mav_tasks.engine.services.vehicle_status import identity_of, passes_checks
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavResult
 from mav_tasks.probe.conversation import NO_ANSWER, Conversation
 from mav_tasks.probe.findings import Findings, Rate
 from mav_tasks.probe.parameters import ask_parameters
 from mav_tasks.probe.steps import Steps, Wait, pause
-from mav_tasks.services.interval_requester import WANTED
-from mav_tasks.services.persona import persona_of
-from mav_tasks.services.vehicle_status import identity_of, passes_checks
 
 LISTEN = 3.0  # s, in which what comes by itself is counted
 ASK_AGAIN = 0.5  # s

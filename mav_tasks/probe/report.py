@@ -6,10 +6,10 @@ from enum import Enum
 from math import isfinite
 from typing import Any, NamedTuple
 
+from mav_tasks.config.settings import SET_FAILSAFE, Identity, Turning
+from mav_tasks.engine.services.loss_failsafe import KEEPS_MOVING
 from mav_tasks.mavlink.enums import MavResult, MavType
 from mav_tasks.probe.findings import Drive, Findings, Rate
-from mav_tasks.services.loss_failsafe import KEEPS_MOVING
-from mav_tasks.settings import SET_FAILSAFE, Identity, Turning
 
 NOT_TRIED = "not tried: needs --drive"
 UNKNOWN = "unknown"

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import degrees, pi
 
+from mav_tasks.engine.services.orders import STANDING, Speeds
+from mav_tasks.engine.services.persona import BY_COURSE, WITH_YAW_RATE, Persona
 from mav_tasks.kinds.path import distance, forward_of, wrap
 from mav_tasks.mavlink.enums import MavFrame
 from mav_tasks.probe.drive_controller import DriveController, DriveEnded
 from mav_tasks.probe.findings import Drive
 from mav_tasks.probe.steps import Steps
-from mav_tasks.services.orders import STANDING, Speeds
-from mav_tasks.services.persona import BY_COURSE, WITH_YAW_RATE, Persona
 
 TRIAL_SPEED = 0.2  # m/s
 TRIAL_WAY = 0.1  # m; further a trial need not go

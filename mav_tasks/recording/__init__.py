@@ -5,11 +5,11 @@ Recorders are observers of the engine (``observer.py``) that queue entries; thei
 
 import time
 
-from mav_tasks.observer import EngineObserver
+from mav_tasks.config.settings import Recording, Settings
 from mav_tasks.recording.decisions import Decisions
 from mav_tasks.recording.new_files import prepared, stamp
+from mav_tasks.recording.observer import EngineObserver
 from mav_tasks.recording.tlog import Tlog
-from mav_tasks.settings import Recording, Settings
 from mav_tasks.tasks.restored import Restored
 
 __all__ = ["observers"]

@@ -8,15 +8,15 @@ from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from mav_tasks.basics.errors import RecordError
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import Input, Outgoing
-from mav_tasks.errors import RecordError
 from mav_tasks.recording.backlog import MOST, PAUSE, ROOM_OF_PACKET, Backlog, room_of
 from mav_tasks.recording.new_files import new_file
 from mav_tasks.recording.record_file import RecordFile
 from mav_tasks.recording.record_lines import FORMAT, MAGIC, ROWS, LineWriter, Unwritable, dumps
 from mav_tasks.recording.surroundings import restored_to_json
 from mav_tasks.recording.writing import WritingThread
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
 

@@ -4,8 +4,8 @@ import os
 from datetime import UTC, datetime
 from pathlib import Path
 
-from mav_tasks.errors import RecordError
-from mav_tasks.folders import make_private
+from mav_tasks.basics.errors import RecordError
+from mav_tasks.basics.folders import make_private
 
 FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC  # O_EXCL follows no symbolic link
 MOST_OF_A_NAME = 100_000

@@ -16,12 +16,12 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from mav_tasks.basics.errors import RecordError
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import Input
-from mav_tasks.errors import RecordError
 from mav_tasks.recording.record_file import GZIP
 from mav_tasks.recording.record_lines import EVENTS, FORMAT, MAGIC, ROWS, input_of
 from mav_tasks.recording.surroundings import restored_of, settings_of
-from mav_tasks.settings import Settings
 from mav_tasks.store.codec import Decoder, Unreadable
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored

@@ -28,11 +28,11 @@ from hashlib import blake2b
 from json import JSONEncoder
 from typing import Any, assert_never, get_args
 
+from mav_tasks.config.settings import Limits
 from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Packets
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.recording.surroundings import restored_of, restored_to_json, settings_of
-from mav_tasks.settings import Limits
 from mav_tasks.store.codec import Decoder, Encoder, format_of
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.lifecycle import TaskState

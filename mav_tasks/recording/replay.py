@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from json import loads
 from typing import Any
 
+from mav_tasks.basics.errors import RecordError
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import KeysChanged, Outgoing, WallClock
-from mav_tasks.errors import RecordError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.mavlink.signing import Key

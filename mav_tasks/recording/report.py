@@ -6,10 +6,10 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any, TextIO
 
-from mav_tasks.logs.rendering import event_values
 from mav_tasks.recording.decisions import CLOSED, project_version
 from mav_tasks.recording.reading import Record
 from mav_tasks.recording.replay import Difference, Happened, Replay
+from mav_tasks.store.rendering import event_values
 
 
 class Report:

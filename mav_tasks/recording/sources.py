@@ -11,9 +11,9 @@ from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import Input, LinkSide, Packets
-from mav_tasks.errors import UsageError
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.recording.decisions import SUFFIX
 from mav_tasks.recording.reading import Record, is_record, read

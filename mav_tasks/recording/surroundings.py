@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import astuple, fields, is_dataclass
 from typing import Any
 
-from mav_tasks.settings import Settings, VehicleProfile
+from mav_tasks.config.settings import Settings, VehicleProfile
 from mav_tasks.tasks.events import SignatureTime
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored

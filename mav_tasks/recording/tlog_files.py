@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from mav_tasks.folders import make_private
+from mav_tasks.basics.folders import make_private
 from mav_tasks.recording.new_files import new_file, write_all
 
 SUFFIX = ".tlog"

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from mav_tasks.errors import RecordError
+from mav_tasks.basics.errors import RecordError
 from mav_tasks.mavlink.codec import crc_fits
 from mav_tasks.mavlink.packet import (
     CRC,

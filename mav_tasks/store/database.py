@@ -15,7 +15,7 @@ from errno import ENOENT
 from pathlib import Path
 from typing import Any
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store import schema
 from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 
-from mav_tasks.clock import boot_time
-from mav_tasks.errors import StoreError
-from mav_tasks.mailbox import Mailbox
-from mav_tasks.settings import Retention
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.basics.mailbox import Mailbox
+from mav_tasks.config.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import HaltsKept, Kept, Outcome, Which
 from mav_tasks.store.batch import Batch

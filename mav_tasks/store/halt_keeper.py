@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 from threading import Thread
 
-from mav_tasks.mailbox import Mailbox
+from mav_tasks.basics.mailbox import Mailbox
 from mav_tasks.store.base import HaltNotKept, HaltsKept, Outcome
 from mav_tasks.store.failures import words_for
 from mav_tasks.store.halt_record import HaltRecord, Word

@@ -24,7 +24,7 @@ from errno import EIO
 from pathlib import Path
 from zlib import crc32
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store.held_file import HeldFile, InUse
 from mav_tasks.tasks.events import (
     Event,

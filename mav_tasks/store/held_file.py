@@ -13,7 +13,7 @@ from contextlib import suppress
 from errno import ELOOP, ENOENT
 from pathlib import Path
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 
 GONE = "the file was removed or replaced while it was in use: put it back, or end this server"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from platformdirs import user_state_path
 
-from mav_tasks.whole_file import write_whole
+from mav_tasks.basics.whole_file import write_whole
 
 LATEST = "latest-store"  # of the server that was started last
 RUNNING = "server-*.store"  # of one process each, which holds a lock on it as long as it runs

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from mav_tasks.errors import StoreError
-from mav_tasks.settings import Retention
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.config.settings import Retention
 from mav_tasks.store.base import JournalReader, Kept, Outcome, Which
 from mav_tasks.store.opening import IN_MEMORY
 from mav_tasks.tasks.events import Event

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Protocol, cast
 
-from mav_tasks.clock import boot_time
-from mav_tasks.errors import StoreError
-from mav_tasks.settings import Retention
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.config.settings import Retention
 from mav_tasks.store.base import JournalReader, Store, Which
 from mav_tasks.store.place import without_password
 

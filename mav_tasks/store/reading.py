@@ -11,7 +11,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store.codec import Decoder, Unreadable, loads
 from mav_tasks.store.connection import Connection
 from mav_tasks.store.event_database import Reader

@@ -9,7 +9,7 @@ only the latest are kept; its own row has its state.
 from collections.abc import Iterator
 from math import inf
 
-from mav_tasks.settings import Retention
+from mav_tasks.config.settings import Retention
 from mav_tasks.store.connection import Connection
 
 STEP = 250  # tasks deleted in one transaction

@@ -4,7 +4,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store.tables import Tables
 
 APPLICATION_ID = 0x4D565453  # "MVTS"; keeps us from writing to another program's database

@@ -9,9 +9,9 @@ from secrets import token_hex
 
 from platformdirs import user_data_path
 
-from mav_tasks.errors import StoreError
-from mav_tasks.folders import at_home, make_private
-from mav_tasks.settings import Retention
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.basics.folders import at_home, make_private
+from mav_tasks.config.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import Which
 from mav_tasks.store.database import Database, holder_of

@@ -9,8 +9,8 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Thread
 
-from mav_tasks.clock import boot_time
-from mav_tasks.mailbox import Mailbox
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.mailbox import Mailbox
 from mav_tasks.store.base import Kept, NonceTaken, NotKept, Outcome
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from math import hypot
 from operator import attrgetter
 
-from mav_tasks.errors import Rejection
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.basics.latest import keep_latest, shorten
 from mav_tasks.kinds import GlobalPlace, GoTo
-from mav_tasks.latest import keep_latest, shorten
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry

@@ -7,7 +7,7 @@ of that, so each gateway that gets it signs ahead of the one before.
 
 from collections.abc import Iterator
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.events import SERVER, QueuePaused
 from mav_tasks.tasks.halts import WORDS, LastHalt
 from mav_tasks.tasks.lifecycle import ACTIVE, LOSSES, RUNNING, WAITING, TaskReason, TaskState

@@ -9,7 +9,7 @@ from collections.abc import Hashable
 from math import inf
 from typing import Generic, NamedTuple, TypeVar
 
-from mav_tasks.latest import keep_latest
+from mav_tasks.basics.latest import keep_latest
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
 

@@ -7,7 +7,7 @@ those of the dialect's TASK_STATE and TASK_REASON.
 
 from enum import IntEnum
 
-from mav_tasks.errors import IllegalTransition
+from mav_tasks.basics.errors import IllegalTransition
 
 
 class TaskState(IntEnum):

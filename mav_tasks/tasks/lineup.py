@@ -8,9 +8,9 @@ from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
-from mav_tasks.errors import Rejection
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.kinds import SingleGoal
-from mav_tasks.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.tasks.driving.bounds import Bounds, safe_braking
 from mav_tasks.tasks.driving.executor import Executor
 from mav_tasks.tasks.driving.mission_sequencer import goal_of

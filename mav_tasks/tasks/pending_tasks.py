@@ -20,8 +20,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from mav_tasks.errors import Rejection
-from mav_tasks.settings import Settings
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.cron import utc_text
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState

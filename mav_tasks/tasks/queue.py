@@ -10,7 +10,7 @@ from bisect import bisect_left, insort
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from mav_tasks.settings import Queueing
+from mav_tasks.config.settings import Queueing
 from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, QueuePlace, Task, TaskId
 

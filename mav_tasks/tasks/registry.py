@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import islice
 from typing import cast
 
-from mav_tasks.errors import Rejection
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.tasks.events import (
     SERVER,
     ActTold,

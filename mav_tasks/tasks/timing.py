@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from math import ceil
 
-from mav_tasks.histogram import Histogram
+from mav_tasks.basics.histogram import Histogram
 
 FINE = 1e-4  # s, resolution of the percentiles up to FINE_END
 FINE_END = 0.2  # s

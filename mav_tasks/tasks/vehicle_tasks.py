@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable
 from dataclasses import replace
 from math import inf
 
-from mav_tasks.errors import Rejection
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.executor import has_moved
 from mav_tasks.tasks.driving.mission_sequencer import (

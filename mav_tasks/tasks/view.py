@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from mav_tasks.config.settings import DEFAULT_TURNING_RADIUS, Turning, Watch
 from mav_tasks.kinds import GlobalPlace, GoTo, LocalPlace, SingleGoal
 from mav_tasks.kinds.guidance import ZERO, Motion, Velocity
-from mav_tasks.settings import DEFAULT_TURNING_RADIUS, Turning, Watch
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Frame

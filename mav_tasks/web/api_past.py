@@ -6,8 +6,8 @@ from typing import Any
 from starlette.responses import Response
 
 from mav_tasks.client.parts import TASK_ID, VEHICLE_ID
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import LARGEST, Number
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import LARGEST, Number
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services

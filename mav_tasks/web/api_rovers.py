@@ -4,14 +4,14 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
+from mav_tasks.basics.errors import MavTasksError, NoSuchVehicle, Refused
 from mav_tasks.client.aio import Client
 from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
 from mav_tasks.client.parts import EPOCH, VEHICLE_ID
-from mav_tasks.errors import MavTasksError, NoSuchVehicle, Refused
+from mav_tasks.config.setting_keys.parts import Part, schema_of
+from mav_tasks.config.setting_keys.shapes import LARGEST, Flag, Items, Number, Record
 from mav_tasks.kinds.goto import ON_EARTH
-from mav_tasks.plan_files import PlanFile
-from mav_tasks.setting_keys.parts import Part, schema_of
-from mav_tasks.setting_keys.shapes import LARGEST, Flag, Items, Number, Record
+from mav_tasks.plans import PlanFile
 from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation

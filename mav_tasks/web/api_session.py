@@ -7,12 +7,12 @@ from importlib.metadata import version
 
 from starlette.responses import Response, StreamingResponse
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.client.parts import KEY_TEXT
-from mav_tasks.errors import UsageError
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Text
 from mav_tasks.kinds.in_json import FORMS
 from mav_tasks.mavlink.label import MAX_LABEL
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Text
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
 from mav_tasks.web.events import description
 from mav_tasks.web.guard import UNKNOWN

@@ -4,6 +4,7 @@ from typing import Any
 
 from starlette.responses import Response
 
+from mav_tasks.basics.errors import NoSuchVehicle
 from mav_tasks.client.aio import Client
 from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.parts import (
@@ -22,10 +23,9 @@ from mav_tasks.client.parts import (
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.terms import AnyRover
 from mav_tasks.client.values import TaskStatus
-from mav_tasks.errors import NoSuchVehicle
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Flag, Number
 from mav_tasks.kinds.in_json import goals_of
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Flag, Number
 from mav_tasks.tasks.repetition import MAX_PERIOD
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from mav_tasks.errors import MavTasksError
-from mav_tasks.plan_files.values import FenceCircle, FencePolygon, GeoPoint, PlanFile, PlanItem
-from mav_tasks.setting_keys.parts import Part, read_all, shortened
-from mav_tasks.setting_keys.shapes import Choice, Flag, Items, Number, Record, Text
+from mav_tasks.basics.errors import MavTasksError
+from mav_tasks.config.setting_keys.parts import Part, read_all, shortened
+from mav_tasks.config.setting_keys.shapes import Choice, Flag, Items, Number, Record, Text
+from mav_tasks.plans.values import FenceCircle, FencePolygon, GeoPoint, PlanFile, PlanItem
 from mav_tasks.web.guard import SMALL_BODY
 from mav_tasks.web.plan_text import READINGS, Parts
 from mav_tasks.web.problems import Problem, invalid, problem_of

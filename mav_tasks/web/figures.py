@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from itertools import chain
 from math import inf
 
-from mav_tasks.histogram import Histogram
+from mav_tasks.basics.histogram import Histogram
 from mav_tasks.metrics import families as f
 from mav_tasks.metrics import process
 from mav_tasks.metrics.exposition import PREFIX, Family, Sample, lines_of

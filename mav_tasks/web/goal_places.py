@@ -8,10 +8,10 @@ import re
 from collections.abc import Sequence
 
 from mav_tasks.client.wire import Goal
+from mav_tasks.engine.services.missions import Item
 from mav_tasks.kinds import GlobalPlace, GoTo, LocalPlace
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
-from mav_tasks.plan_files.values import PlanItem
-from mav_tasks.services.missions import Item
+from mav_tasks.plans.values import PlanItem
 
 Place = dict[str, float]
 

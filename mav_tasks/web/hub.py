@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import AsyncGenerator, Callable, Iterable
 from typing import Any
 
-from mav_tasks.crowd import first_of_crowd
+from mav_tasks.basics.crowd import first_of_crowd
 
 KEPT = 2000  # events for readers that reconnect
 KEPT_BYTES = 4_000_000

@@ -6,12 +6,12 @@ from contextlib import closing
 from itertools import islice
 from typing import Any
 
-from mav_tasks.errors import StoreError
-from mav_tasks.logs.export import for_people
-from mav_tasks.logs.joined import joined
-from mav_tasks.logs.rendering import event_values
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.shell.logs.export import for_people
+from mav_tasks.shell.logs.joined import joined
 from mav_tasks.store.base import Which
 from mav_tasks.store.opening import kind_of
+from mav_tasks.store.rendering import event_values
 from mav_tasks.tasks.events import TaskSubmitted
 from mav_tasks.tasks.task import Task
 

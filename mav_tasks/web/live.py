@@ -12,11 +12,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
+from mav_tasks.basics.errors import ClientError
+from mav_tasks.basics.latest import shorten
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import what_of
 from mav_tasks.client.values import News, QueueStatus, TaskStatus, Text, VehicleChanged
-from mav_tasks.errors import ClientError
-from mav_tasks.latest import shorten
 from mav_tasks.web.forms import queue_form, task_form, text_form, vehicle_form
 from mav_tasks.web.goal_places import Place, places_of_words
 from mav_tasks.web.hub import Hub

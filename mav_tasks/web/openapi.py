@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from importlib.metadata import version
 from typing import Any
 
-from mav_tasks.setting_keys.parts import Part, schema_of
-from mav_tasks.setting_keys.schema import ref
+from mav_tasks.config.setting_keys.parts import Part, schema_of
+from mav_tasks.config.setting_keys.schema import ref
 from mav_tasks.web.operation import ROOT, Operation
 from mav_tasks.web.problems import MEDIA_TYPE
 from mav_tasks.web.schemas import SCHEMAS

@@ -8,8 +8,8 @@ from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from mav_tasks.errors import MavTasksError, SettingError
-from mav_tasks.setting_keys.parts import Part, shortened
+from mav_tasks.basics.errors import MavTasksError, SettingError
+from mav_tasks.config.setting_keys.parts import Part, shortened
 from mav_tasks.tasks.task import MAX_TASK_ID
 from mav_tasks.web.bodies import read
 from mav_tasks.web.identity import LOCAL, Identity

@@ -10,7 +10,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from mav_tasks.errors import UsageError, missing
+from mav_tasks.basics.errors import UsageError, missing
 from mav_tasks.web.tiles import Tiles
 
 STATIC = Path(__file__).parent / "static"

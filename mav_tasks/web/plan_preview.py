@@ -5,7 +5,7 @@ from math import cos, hypot, radians
 from typing import Any
 
 from mav_tasks.client.fence_form import shapes_of
-from mav_tasks.plan_files import PlanFile
+from mav_tasks.plans import PlanFile
 from mav_tasks.web.goal_places import Place, on_earth, places_of_items
 from mav_tasks.web.origins import METRES_PER_DEGREE
 

@@ -5,11 +5,11 @@ from typing import Any
 
 from starlette.responses import JSONResponse
 
-from mav_tasks.errors import PlanFileError
-from mav_tasks.plan_files import PlanFile, parse_plan
-from mav_tasks.services.missions import CAPACITY
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Text
+from mav_tasks.basics.errors import PlanFileError
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Text
+from mav_tasks.engine.services.missions import CAPACITY
+from mav_tasks.plans import PlanFile, parse_plan
 from mav_tasks.web.plan_preview import preview_of
 
 LONGEST = 6_000_000  # characters; QGroundControl writes some 900 for an item

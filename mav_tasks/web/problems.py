@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 from starlette.responses import JSONResponse
 
-from mav_tasks.client.descriptions import with_resume
-from mav_tasks.errors import (
+from mav_tasks.basics.errors import (
     ClientError,
     MavTasksError,
     NoAnswer,
@@ -15,6 +14,7 @@ from mav_tasks.errors import (
     SettingError,
     UsageError,
 )
+from mav_tasks.client.descriptions import with_resume
 from mav_tasks.tasks.lifecycle import TaskReason
 
 MEDIA_TYPE = "application/problem+json"

@@ -13,16 +13,16 @@ from math import ceil, degrees, floor, hypot, isfinite
 from pathlib import Path
 from typing import Any
 
-from mav_tasks.errors import RecordError, UsageError
-from mav_tasks.logs.rendering import clean
+from mav_tasks.basics.errors import RecordError, UsageError
+from mav_tasks.engine.services.persona import persona_of
+from mav_tasks.engine.services.statustext import TextReceiver
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.recording.sources import Happened, Heard, items_of
-from mav_tasks.services.persona import persona_of
-from mav_tasks.services.statustext import TextReceiver
+from mav_tasks.store.rendering import clean
 from mav_tasks.tasks.events import TaskProgressed
 
 WANTED = frozenset({m.Heartbeat.id, m.LocalPositionNed.id, m.Attitude.id, m.Statustext.id})

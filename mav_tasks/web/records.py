@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.recording.decisions import SUFFIX
 from mav_tasks.web.problems import Problem, not_found
 

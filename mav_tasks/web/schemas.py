@@ -1,7 +1,7 @@
 """The JSON schemas of the API's answers, as ``forms`` and the handlers make them."""
 
 from mav_tasks.client.json_form import QUEUE, TASK, TIMING, VEHICLE, schemas_of
-from mav_tasks.setting_keys.schema import (
+from mav_tasks.config.setting_keys.schema import (
     FLAG,
     INTEGER,
     NUMBER,

@@ -6,8 +6,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.client.aio import Client
-from mav_tasks.errors import StoreError
 from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.goal import Plan

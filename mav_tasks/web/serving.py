@@ -7,13 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from ipaddress import ip_address
 
-from mav_tasks import http_connections
+from mav_tasks.basics.errors import UsageError, reason_of
 from mav_tasks.client.aio import Client
-from mav_tasks.errors import UsageError, reason_of
-from mav_tasks.http_connections import HttpLimits, HttpServer, allow_files, under_load
-from mav_tasks.key_ring.watch import RingWatch
+from mav_tasks.config.key_ring.watch import RingWatch
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.shell import http_connections
+from mav_tasks.shell.http_connections import HttpLimits, HttpServer, allow_files, under_load
 from mav_tasks.web.application import application
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
+from mav_tasks.basics.errors import MavTasksError, NoAnswer, Refused
 from mav_tasks.client.aio import Client
 from mav_tasks.client.values import TaskStatus
-from mav_tasks.errors import MavTasksError, NoAnswer, Refused
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.web.flights import Flights
 from mav_tasks.web.users import Line

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
+from mav_tasks.basics.errors import Refused
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.idempotency import LONGEST, numbers_of
 from mav_tasks.client.parts import AFTER, AT, CRON, DEADLINE, DELAY, EVERY, LABEL, PRIORITY
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.terms import AnyRover
-from mav_tasks.errors import Refused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 from mav_tasks.web.problems import Problem, invalid

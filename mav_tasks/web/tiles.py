@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from mav_tasks.errors import UsageError
-from mav_tasks.folders import at_home
+from mav_tasks.basics.errors import UsageError
+from mav_tasks.basics.folders import at_home
 
 KINDS = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
 DEEPEST = 22

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from hashlib import sha256
 from hmac import compare_digest
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.client.aio import Client
-from mav_tasks.errors import UsageError
-from mav_tasks.key_ring.watch import RingWatch
+from mav_tasks.config.key_ring.watch import RingWatch
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.web.identity import Identity
 

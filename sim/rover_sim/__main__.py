@@ -15,8 +15,8 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import TextIO
 
-from mav_tasks.errors import KeyRingError
-from mav_tasks.key_ring.ring_file import load, path_of_ring
+from mav_tasks.basics.errors import KeyRingError
+from mav_tasks.config.key_ring.ring_file import load, path_of_ring
 from mav_tasks.mavlink.signing import Key
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mav_tasks import Move, Refused, SyncClient, Wait, read_plan
-from mav_tasks.plan_files import PlanFile, parse_plan
+from mav_tasks.plans import PlanFile, parse_plan
 from tests.kit.commands import Done, called, mav_tasks, session, surroundings
 from tests.kit.processes import Stand, frozen, stand, wait_until
 
@@ -84,7 +84,10 @@ def test_help_loads_nothing_that_it_does_not_need() -> None:
     heavy = {"asyncio", "rich", "pymavlink", "sqlite3", "mav_tasks.client.aio", "json"}
     assert loaded & heavy == set()
     ours = {name for name in loaded if name.startswith("mav_tasks.")}
-    assert {name for name in ours if not name.startswith("mav_tasks.cli")} == {"mav_tasks.errors"}
+    assert {name for name in ours if not name.startswith("mav_tasks.cli")} == {
+        "mav_tasks.basics",
+        "mav_tasks.basics.errors",
+    }
 
 
 def test_it_says_which_version_it_is() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.services.parameter_table import PARAMETERS
+from mav_tasks.config.parameter_table import PARAMETERS
 from tests.kit.mavproxy import Logged, MavProxy, mavproxy
 from tests.kit.processes import Stand, stand, wait_until
 

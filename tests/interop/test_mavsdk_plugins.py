@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.services.parameter_table import PARAMETERS
+from mav_tasks.config.parameter_table import PARAMETERS
 from tests.interop.scripts.heard import STREAMS
 from tests.kit.processes import stand
 from tests.kit.scripts import run_script, some_makes

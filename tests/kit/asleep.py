@@ -7,7 +7,7 @@ after a suspension.
 import signal
 import sys
 
-from mav_tasks import clock
+from mav_tasks.basics import clock
 from mav_tasks.cli.app import main
 
 

@@ -16,8 +16,8 @@ os.environ.setdefault("MAVLINK20", "1")
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.links.memory import MemoryNet
+from mav_tasks.shell.in_memory import CLIENT_LINK
 
 Message = Any  # pymavlink's classes carry no type information
 

@@ -9,11 +9,11 @@ from typing import cast
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
 from mav_tasks.engine.snapshot import VehicleSnapshot
-from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
-from mav_tasks.settings import Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK, InMemoryServer
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

@@ -16,7 +16,12 @@ from pathlib import Path
 from typing import Protocol
 
 #: what runs this way, and is imported before
-PRELOADED = ("mav_tasks.cli.app", "mav_tasks.cli.serve", "mav_tasks.serve", "rover_sim.__main__")
+PRELOADED = (
+    "mav_tasks.cli.app",
+    "mav_tasks.cli.serve",
+    "mav_tasks.shell.serve",
+    "rover_sim.__main__",
+)
 MODULES = ("mav_tasks.cli", "rover_sim")
 
 #: what Python itself reads when it starts; a process that is to have other ones is not forked

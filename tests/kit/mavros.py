@@ -12,7 +12,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from tests.kit.client import IDS, FakeClient, Received, Sent, command_long, set_mode
 from tests.kit.mission import Download, Item, Upload
 from tests.kit.world import World

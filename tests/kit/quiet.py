@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryNet
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.task import Task
 from rover_sim.virtual import VirtualWorld

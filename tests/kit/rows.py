@@ -11,8 +11,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.client import IDS, FakeClient

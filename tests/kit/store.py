@@ -6,7 +6,7 @@ from pathlib import Path
 from select import POLLIN, poll
 from typing import ClassVar
 
-from mav_tasks.settings import Retention
+from mav_tasks.config.settings import Retention
 from mav_tasks.store import HaltsKept, Kept, MemoryStore, NotKept, Outcome
 from mav_tasks.store.halt_record import word_of
 from mav_tasks.store.sqlite import SqliteStore

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from mav_tasks.client.aio import Client
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.config.settings import Settings
 from mav_tasks.links.base import Link
 from mav_tasks.links.memory import MemoryNet
-from mav_tasks.settings import Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from rover_sim.body import Pose
 from rover_sim.field_trial.track import Place, Track
 from rover_sim.frames import Frame

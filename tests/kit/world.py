@@ -6,16 +6,16 @@ from math import degrees, hypot, nan, radians, remainder
 from pathlib import Path
 from typing import Any, TypeVar
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import Outgoing
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.messages import CommandInt
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.observer import EngineObserver
 from mav_tasks.recording.decisions import Decisions
-from mav_tasks.settings import Settings
+from mav_tasks.recording.observer import EngineObserver
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.store import Store
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from tests.kit.bounds import too_large
 from tests.kit.gateways.engines import SETPOINTS, moves
 from tests.kit.packets.mutants import Mutants

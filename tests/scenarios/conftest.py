@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import pytest
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld

@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks import Act
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

@@ -12,7 +12,7 @@ from mav_tasks.agents import submission
 from mav_tasks.agents.durable import Durable
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.submission import Wish
-from mav_tasks.errors import Refused, UsageError
+from mav_tasks.basics.errors import Refused, UsageError
 from rover_sim.testing.rover_world import RoverWorld
 from tests.scenarios.conftest import MakeRoverWorld
 

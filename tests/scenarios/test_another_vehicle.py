@@ -5,8 +5,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.links.memory import Conditions
+from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

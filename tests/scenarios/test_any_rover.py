@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

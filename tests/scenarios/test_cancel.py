@@ -2,10 +2,10 @@
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer
-from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults

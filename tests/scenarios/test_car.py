@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from mav_tasks.config.settings import Settings, VehicleProfile
 from mav_tasks.engine.inputs import Shutdown
-from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.parameters import INT16, Parameter

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona

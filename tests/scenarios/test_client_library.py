@@ -19,9 +19,9 @@ from mav_tasks import (
     TaskState,
     Wait,
 )
-from mav_tasks.errors import ClientError, MavTasksError
-from mav_tasks.in_memory import CLIENT_LINK
-from mav_tasks.plan_files import GeoPoint, PlanFile
+from mav_tasks.basics.errors import ClientError, MavTasksError
+from mav_tasks.plans import GeoPoint, PlanFile
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.restored import Restored
 from rover_sim.testing.rover_world import RoverWorld

@@ -4,7 +4,7 @@ from math import nan
 
 import pytest
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.cases import for_each

@@ -3,7 +3,7 @@
 All that the checker may do to a rover it does: it arms, drives by setpoints of its own, uploads.
 """
 
-from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from rover_sim.check_vehicle.context import Options
 from rover_sim.check_vehicle.contract import check_vehicle
 from rover_sim.personas import PERSONAS, Mode

@@ -4,7 +4,7 @@ from math import nan
 
 import pytest
 
-from mav_tasks.settings import Driving, Settings
+from mav_tasks.config.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.world import World, at

@@ -4,7 +4,7 @@ from math import copysign
 
 import pytest
 
-from mav_tasks.settings import Settings, Watch
+from mav_tasks.config.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.body import Pose

@@ -5,8 +5,8 @@ from random import Random
 
 import pytest
 
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import TaskSubmitted
 from tests.kit.cases import for_each
 from tests.kit.client import MOVE, REPEATS, TASK_STATUS, FakeClient, TaskStatus, command_long

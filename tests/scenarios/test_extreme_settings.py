@@ -2,9 +2,9 @@
 
 from random import Random
 
+from mav_tasks.config.setting_keys.shapes import Number
+from mav_tasks.config.settings import BOUNDED, KEYS, ServerSettings, Settings
 from mav_tasks.engine.inputs import Shutdown
-from mav_tasks.setting_keys.shapes import Number
-from mav_tasks.settings import BOUNDED, KEYS, ServerSettings, Settings
 from rover_sim.faults import Faults
 from rover_sim.personas import Persona
 from tests.kit.cases import for_each

@@ -2,8 +2,8 @@
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Driving, Settings, Watch
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Driving, Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults

@@ -5,7 +5,7 @@ Each row has a rover of its own that has just been switched on.
 
 import pytest
 
-from mav_tasks.errors import UsageError
+from mav_tasks.basics.errors import UsageError
 from rover_sim.field_trial.ground import Limits
 from rover_sim.field_trial.rows import Row, Verdict, table
 from rover_sim.field_trial.rows_run import run_rows

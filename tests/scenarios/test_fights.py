@@ -5,8 +5,8 @@ from itertools import pairwise
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
 from mav_tasks.links.memory import MemoryLink, MemoryNet
+from mav_tasks.shell.in_memory import CLIENT_LINK, InMemoryServer
 from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.events import Event, TaskChanged, TaskWaits
 from mav_tasks.tasks.lifecycle import TaskReason as R

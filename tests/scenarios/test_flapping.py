@@ -1,7 +1,7 @@
 """Links that come and go all the time, and a net that changes the order of what it carries."""
 
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.links.memory import Conditions
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
-from mav_tasks.settings import Limits, Roles, Settings
+from mav_tasks.config.settings import Limits, Roles, Settings
 from mav_tasks.tasks.events import TaskModified, VehicleSpeedSet
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, FakeClient, Sent, command_long

@@ -4,9 +4,9 @@ from itertools import count
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Clients, Limits, Roles, Settings
 from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.links.memory import MemoryLink
-from mav_tasks.settings import Clients, Limits, Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import (

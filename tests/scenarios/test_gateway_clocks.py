@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each

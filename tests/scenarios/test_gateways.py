@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.config.settings import Settings
 from mav_tasks.mavlink.signing import Key, signed, timestamp_at
-from mav_tasks.settings import Settings
+from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task

@@ -3,10 +3,10 @@
 from pymavlink.dialects.v20 import ardupilotmega as ardupilot
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Clients, Limits, Roles, Settings
 from mav_tasks.engine.inputs import KeysChanged, PeerChanged, SettingsChanged
-from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import Clients, Limits, Roles, Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.config.settings import Limits
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
-from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import Limits
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.geo import DEFAULT_ORIGIN

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mav_tasks import Act, Drive, Face, GoTo, LocalPlace, Move, Rotate, SyncClient, Wait
-from mav_tasks.plan_files import GeoPoint, PlanFile
-from mav_tasks.settings import Driving, Settings
+from mav_tasks.config.settings import Driving, Settings
+from mav_tasks.plans import GeoPoint, PlanFile
 from rover_sim.testing.rover_world import RoverWorld
 from tests.scenarios.conftest import MakeRoverWorld
 

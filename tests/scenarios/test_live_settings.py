@@ -1,11 +1,11 @@
 """Settings that change while the server runs: each has effect, on what is there already, too."""
 
-from mav_tasks.engine.inputs import SettingsChanged
-from mav_tasks.settings import (
+from mav_tasks.config.settings import (
     Driving,
     Settings,
     Watch,
 )
+from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults

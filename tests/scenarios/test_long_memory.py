@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from mav_tasks.settings import Clients, Settings
+from mav_tasks.config.settings import Clients, Settings
 from tests.kit.bounds import entries
 from tests.scenarios.conftest import MakeWorld
 

@@ -2,9 +2,9 @@
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import PeerChanged
-from mav_tasks.in_memory import CLIENT_LINK
-from mav_tasks.settings import Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode

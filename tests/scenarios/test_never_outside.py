@@ -4,9 +4,9 @@ from collections.abc import Callable
 from math import cos, nan, pi, sin
 from random import Random
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import GlobalPlace, LocalPlace
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Persona

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from mav_tasks.settings import Settings, Watch
+from mav_tasks.config.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults

@@ -7,10 +7,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Clients, Driving, Queueing, Roles, Settings, Watch
 from mav_tasks.engine.inputs import Congestion, Packets, PeerChanged
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavAutopilot
-from mav_tasks.settings import Clients, Driving, Queueing, Roles, Settings, Watch
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

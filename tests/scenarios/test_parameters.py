@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.parameter_table import PARAMETERS
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import ParametersChanged
-from mav_tasks.services.parameter_table import PARAMETERS
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import ParameterSet
 from mav_tasks.tasks.restored import Restored
 from tests.kit.cases import for_each

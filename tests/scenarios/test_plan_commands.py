@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from mav_tasks.settings import Settings, VehicleProfile
+from mav_tasks.config.settings import Settings, VehicleProfile
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.car import Car

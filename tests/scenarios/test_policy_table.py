@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega, common
 
-from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.config.settings import ROLES, Clients, Limits, Roles, Settings
 from mav_tasks.mavlink import messages as m
-from mav_tasks.settings import ROLES, Clients, Limits, Roles, Settings
+from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskState
 from rover_sim.personas import Mode
 from tests.kit.client import GUIDED, FakeClient, command_long

@@ -3,7 +3,7 @@
 from math import hypot
 from random import Random
 
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

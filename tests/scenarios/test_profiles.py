@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import partial
 
-from mav_tasks.settings import Settings, VehicleProfile
+from mav_tasks.config.settings import Settings, VehicleProfile
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

@@ -5,7 +5,7 @@ was told last. Nothing of ours may wake it, and its HOLD is not one that somebod
 from pathlib import Path
 from typing import Any
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

@@ -4,7 +4,7 @@ import json
 from math import pi
 
 from mav_tasks.kinds import Move, Rotate
-from mav_tasks.qgc_actions import ACTIONS, file_of
+from mav_tasks.plans.qgc_actions import ACTIONS, file_of
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each

@@ -2,7 +2,7 @@
 
 from math import hypot
 
-from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode, Persona

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Clients, Queueing, Settings
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Clients, Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.engine.inputs import Shutdown
-from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from mav_tasks.settings import Limits, Roles, Settings
+from mav_tasks.config.settings import Limits, Roles, Settings
 from mav_tasks.tasks.events import QueuePaused, SubmissionRefused, TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

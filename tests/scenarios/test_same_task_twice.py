@@ -2,7 +2,7 @@
 
 import pytest
 
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import anew, for_each

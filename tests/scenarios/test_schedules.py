@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.mavlink.label import text_pieces
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING
 from mav_tasks.tasks.lifecycle import TaskReason as R

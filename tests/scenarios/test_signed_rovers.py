@@ -5,10 +5,10 @@ from pathlib import Path
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Packets
-from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.mavlink.signing import Key, is_signed_with
+from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Settings, Signing
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, SettingsChanged, WallClock
-from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import Settings, Signing
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long

@@ -6,7 +6,7 @@ It has stored a time two minutes ahead: needed if its clock was set back, and of
 from pathlib import Path
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
-from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from tests.kit.cases import for_each
 from tests.kit.client import FakeClient, heartbeat
 from tests.kit.restarts import UTC, restart

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mav_tasks import Client, Move, NoAnswer, Refused, TaskReason, TaskState
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from rover_sim.faults import Faults
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld

@@ -1,6 +1,6 @@
 """What a task waits for, and what becomes of it when the rover does not want to."""
 
-from mav_tasks.settings import Settings, Watch
+from mav_tasks.config.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults

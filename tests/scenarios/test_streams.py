@@ -13,7 +13,7 @@ from mav_tasks.engine.inputs import (
     LinkSide,
     PeerChanged,
 )
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import anew
 from tests.kit.client import ACCEPTED, GUIDED, REQUEST, SET_INTERVAL, FakeClient, setpoint

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import ACCEPTED, REQUEST

@@ -9,7 +9,7 @@ from dataclasses import replace
 from math import inf
 from pathlib import Path
 
-from mav_tasks.settings import Retention
+from mav_tasks.config.settings import Retention
 from mav_tasks.store import NotKept, Outcome
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.snapshot import VehicleSnapshot
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.task import Task
 from rover_sim.personas import Persona

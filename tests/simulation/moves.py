@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.config.settings import Clients, Driving, Queueing, Settings
 from mav_tasks.links.memory import Conditions, Radio
-from mav_tasks.settings import Clients, Driving, Queueing, Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TERMINAL
 from rover_sim.faults import Faults
 from rover_sim.personas import PERSONAS, Mode

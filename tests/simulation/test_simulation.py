@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import TaskId

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import WallClock
-from mav_tasks.in_memory import CLIENT_LINK
-from mav_tasks.settings import Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.lifecycle import TaskState
 from rover_sim.personas import Persona

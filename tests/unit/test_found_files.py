@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from mav_tasks import read_plan
-from mav_tasks.errors import PlanFileError
-from mav_tasks.plan_files import parse_plan
+from mav_tasks.basics.errors import PlanFileError
+from mav_tasks.plans import parse_plan
 from tests.kit.found_files import FILES, Found
 
 

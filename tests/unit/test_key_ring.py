@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import KeyRingError
-from mav_tasks.key_ring.ring_file import change, load, path_of_ring
-from mav_tasks.key_ring.toml_form import ring_of, text_of
-from mav_tasks.key_ring.watch import changes
+from mav_tasks.basics.errors import KeyRingError
+from mav_tasks.config.key_ring.ring_file import change, load, path_of_ring
+from mav_tasks.config.key_ring.toml_form import ring_of, text_of
+from mav_tasks.config.key_ring.watch import changes
 
 KEY = '[keys.{}]\nrole = "operator"\nsecret = "{:064x}"\n'
 ANNA, DIGITS, ZERO = KEY.format("anna", 1), f"{1:064x}", "0" * 64

@@ -30,10 +30,10 @@ from mav_tasks.config.configuration import Sources
 from mav_tasks.config.reload import taken
 from mav_tasks.config.sample import sample
 from mav_tasks.config.words import flag_of_set
-from mav_tasks.errors import ConfigError
+from mav_tasks.basics.errors import ConfigError
 from mav_tasks.recording.surroundings import settings_of
-from mav_tasks.services.parameter_table import PARAMETERS, changed
-from mav_tasks.settings import KEYS, Driving, ServerSettings, Settings
+from mav_tasks.config.parameter_table import PARAMETERS, changed
+from mav_tasks.config.settings import KEYS, Driving, ServerSettings, Settings
 
 def creep(file="", environment=(), *flags):
     return Sources(file, dict(environment), flags).load().settings.engine.driving.creep
@@ -80,7 +80,7 @@ for arguments in (["--help"], ["--creep", "10"], slow.split()):
 def test_a_new_setting_is_one_field(tmp_path: Path) -> None:
     copy = tmp_path / "mav_tasks"
     shutil.copytree(ROOT / "mav_tasks", copy, ignore=shutil.ignore_patterns("__pycache__"))
-    path = copy / "settings.py"
+    path = copy / "config" / "settings.py"
     text = path.read_text(encoding="utf-8")
     assert text.count(BEFORE) == 1
     path.write_text(text.replace(BEFORE, ADDED + BEFORE), encoding="utf-8")

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.errors import PlanFileError
-from mav_tasks.plan_files import (
+from mav_tasks.basics.errors import PlanFileError
+from mav_tasks.plans import (
     FenceCircle,
     FencePolygon,
     GeoPoint,
@@ -20,7 +20,7 @@ from mav_tasks.plan_files import (
     parse_plan,
     read_plan,
 )
-from mav_tasks.plan_files.reader import MAX_ITEMS, MAX_SIZE
+from mav_tasks.plans.reader import MAX_ITEMS, MAX_SIZE
 
 NAN = math.nan  # items that hold it are equal, as the reader gives this very one
 

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavwp
 
-from mav_tasks.errors import PlanFileError
-from mav_tasks.plan_files import (
+from mav_tasks.basics.errors import PlanFileError
+from mav_tasks.plans import (
     FenceCircle,
     FencePolygon,
     GeoPoint,

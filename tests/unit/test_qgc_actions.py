@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli.app import app
-from mav_tasks.errors import UsageError
-from mav_tasks.qgc_actions import ACTIONS, FILE_TYPES, file_of, parse_action
+from mav_tasks.plans.qgc_actions import ACTIONS, FILE_TYPES, file_of, parse_action
 
 MOVE, STOP = 54000, 54003
 

@@ -14,11 +14,11 @@ import pytest
 from typer.testing import CliRunner
 
 from mav_tasks import write_plan
+from mav_tasks.basics.errors import MavTasksError, StoreError
 from mav_tasks.cli.app import app
-from mav_tasks.errors import MavTasksError, StoreError
-from mav_tasks.plan_files import PlanFile, read_plan
+from mav_tasks.config.settings import Recording, Retention, Settings
+from mav_tasks.plans import PlanFile, read_plan
 from mav_tasks.recording import observers
-from mav_tasks.settings import Recording, Retention, Settings
 from mav_tasks.store.base import Store
 from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks.events import VehicleSeen

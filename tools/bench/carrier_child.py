@@ -12,9 +12,9 @@ import sys
 from dataclasses import asdict, dataclass, field
 from itertools import cycle
 
-from mav_tasks.clock import boot_time
+from mav_tasks.basics.clock import boot_time
 from mav_tasks.fleet.exchange import Arrived
-from mav_tasks.fleet_io.carrier import Carrier
+from mav_tasks.fleet.io.carrier import Carrier
 from mav_tasks.store.postgres.address import parse
 from mav_tasks.store.postgres.session import Session
 

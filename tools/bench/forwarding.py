@@ -9,10 +9,10 @@ import socket
 from itertools import cycle, islice
 from time import monotonic
 
+from mav_tasks.engine.services.interval_requester import WANTED
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.enums import MavAutopilot, MavState, MavType
-from mav_tasks.services.interval_requester import WANTED
 
 from .child import child, free_port, udp_socket
 from .scripted import HOLD, VEHICLE, ScriptedVehicle, loopback, meet

@@ -7,10 +7,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic, perf_counter
 
+from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.kinds import Move
-from mav_tasks.serve import tame_collector
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.shell.serve import tame_collector
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry

@@ -17,19 +17,19 @@ import sys
 import time
 from pathlib import Path
 
-from mav_tasks.clock import boot_time
+from mav_tasks.basics.clock import boot_time
 from mav_tasks.config.configuration import Sources
+from mav_tasks.config.key_ring.watch import RingWatch
 from mav_tasks.config.reload import Reload
+from mav_tasks.config.settings import Clients, Limits, Log, Queueing, Recording, Roles, Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Peer
-from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.links.udp import UdpLink, UdpUrl
-from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink import messages as m
 from mav_tasks.recording import observers
-from mav_tasks.runner import Runner
-from mav_tasks.serve import tame_collector
-from mav_tasks.settings import Clients, Limits, Log, Queueing, Recording, Roles, Settings
+from mav_tasks.shell.logs.setup import log_to_stderr
+from mav_tasks.shell.runner import Runner
+from mav_tasks.shell.serve import tame_collector
 from mav_tasks.store.opening import IN_MEMORY, open_store
 
 from .child import HOST, READY

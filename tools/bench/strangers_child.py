@@ -11,12 +11,12 @@ import sys
 import tracemalloc
 from time import process_time_ns
 
+from mav_tasks.config.settings import Clients, Roles, Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.settings import Clients, Roles, Settings
 
 CLIENTS, VEHICLES, ROVER = "clients", "vehicles", "rover"
 CONTINUE, REQUEST = 193, 512

@@ -22,13 +22,13 @@ from time import process_time_ns
 from types import FrameType
 from typing import Any
 
+from mav_tasks.config.settings import Clients, Limits, Queueing, Roles, Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Committed, LinkChanged, LinkSide, Outgoing, Packets
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.packet import split_datagram
-from mav_tasks.settings import Clients, Limits, Queueing, Roles, Settings
 
 CLIENTS, VEHICLES, CLIENT, ROVER = "clients", "vehicles", "client", "rover"
 HOLD, ARMED, CUSTOM = 4, 128, 1  # ArduPilot Rover's mode, MAV_MODE_FLAG

@@ -10,9 +10,9 @@ its form on the web page.
 """
 
 from mav_tasks import Act, Face, Move
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Number
 from mav_tasks.kinds.form import HEADING, Form, any_number
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Number
 
 DEGREE = 0.017453292519943295  # rad
 SLOW = 0.2  # m/s

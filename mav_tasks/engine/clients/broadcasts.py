@@ -13,11 +13,11 @@ from typing import Any
 from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.missions.plan_transfer import MissionMessage
 from mav_tasks.engine.policy import is_task_command
+from mav_tasks.engine.services.commands import command_of
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.codec import Packer
-from mav_tasks.services.commands import command_of
 
 EVERYBODY = 0  # target_system and target_component
 

@@ -18,13 +18,13 @@ from struct import Struct
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets, Place
+from mav_tasks.engine.services.commands import command_of, is_stop
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet, split_datagram
-from mav_tasks.services.commands import command_of, is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
 
 EVERYBODY = 0  # target_system

@@ -3,23 +3,23 @@
 from collections.abc import Callable, Collection
 from math import inf
 
+from mav_tasks.basics.latest import keep_latest, shorten
+from mav_tasks.config.settings import Clients
 from mav_tasks.engine.clients.rights import NOTHING, SUBMITTER, Rights
 from mav_tasks.engine.clients.sender import OBSERVED, Memory, Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.engine.clients.vehicle_view import LONGEST_US, STREAMED, Pace, VehicleView
 from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.engine.packets import PacketSender
+from mav_tasks.engine.services import statustext
+from mav_tasks.engine.services.commands import Answer
+from mav_tasks.engine.services.token_bucket import TokenBucket
 from mav_tasks.engine.timers import Timer
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.latest import keep_latest, shorten
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import statustext
-from mav_tasks.services.commands import Answer
-from mav_tasks.services.token_bucket import TokenBucket
-from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
 
 AT_ONCE = 5.0  # s, whose requests may come in one burst: a script queues a day's work

@@ -12,6 +12,7 @@ from itertools import islice, repeat
 from operator import itemgetter
 from typing import NamedTuple
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
 from mav_tasks.engine.clients.rights import rights_of
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
@@ -27,6 +28,8 @@ from mav_tasks.engine.inputs import (
 )
 from mav_tasks.engine.packets import PacketSender
 from mav_tasks.engine.policy import Row, row_of
+from mav_tasks.engine.services.commands import Command, command_of, is_stop
+from mav_tasks.engine.services.token_bucket import TokenBucket
 from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -42,9 +45,6 @@ from mav_tasks.mavlink.packet import (
     Packet,
 )
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.services.commands import Command, command_of, is_stop
-from mav_tasks.services.token_bucket import TokenBucket
-from mav_tasks.settings import Settings
 
 _NUMBER = re.escape(int(MavCmd.TASK_STOP).to_bytes(2, "little"))
 #: the start of a STOP, MAVLink 1 or 2: COMMAND_INT or COMMAND_LONG, with its command number

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.basics.latest import keep_latest
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import SUBMITTER
@@ -16,14 +18,12 @@ from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.clients.vehicle_view import STOPPED
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.command_request import CommandRequest
+from mav_tasks.engine.services.commands import Command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection
-from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.commands import Command
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry

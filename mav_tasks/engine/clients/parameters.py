@@ -11,20 +11,20 @@ from collections.abc import Mapping
 from functools import partial
 from math import inf
 
+from mav_tasks.basics.errors import Rejection, SettingError
+from mav_tasks.config.parameter_table import PARAMETERS, as_sent, changed, with_all
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.policy import row_of_message
+from mav_tasks.engine.services import file_transfer
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection, SettingError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import file_transfer
-from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import ParameterSet
 from mav_tasks.tasks.registry import TaskRegistry
 

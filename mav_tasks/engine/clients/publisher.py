@@ -12,11 +12,14 @@ heard: the heartbeats of all of them count.
 from functools import partial
 from math import inf
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.submissions import PAUSED, Submissions
+from mav_tasks.engine.services.rate_budget import granted
+from mav_tasks.engine.services.vehicle_status import INTERVAL, component_heartbeat
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.control import Event as ControlEvent
 from mav_tasks.engine.vehicles.joint_control import BUTTONS, Word
@@ -24,9 +27,6 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavSeverity, MavState, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.rate_budget import granted
-from mav_tasks.services.vehicle_status import INTERVAL, component_heartbeat
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import (
     Event,
     QueueContinued,

@@ -24,20 +24,20 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 from math import inf
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.basics.latest import keep_latest
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR
 from mav_tasks.engine.commands.translate import result_of
 from mav_tasks.engine.policy import Kind
+from mav_tasks.engine.services.commands import Answer
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection
-from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.commands import Answer
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry

@@ -8,11 +8,11 @@ from dataclasses import replace
 from math import isnan
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import ROLES, Limits, Roles
 from mav_tasks.engine.clients.signatures import UNSIGNED
-from mav_tasks.errors import Rejection
 from mav_tasks.kinds import Act, SingleGoal
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import ROLES, Limits, Roles
 from mav_tasks.tasks.driving.estimate import MOST_STEPS, Known, time_left
 from mav_tasks.tasks.goal import Goal, Perform, Plan, steps_of
 from mav_tasks.tasks.lifecycle import TaskReason

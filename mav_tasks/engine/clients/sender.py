@@ -9,10 +9,10 @@ from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from math import inf
 
+from mav_tasks.engine.services.commands import DOUBLED, SAME_PACKET, Answer, Command
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.number_line import NumberLine
-from mav_tasks.services.commands import DOUBLED, SAME_PACKET, Answer, Command
 
 REMEMBERED = 512  # packets of one endpoint; a gimbal in motion gets 20 a second
 OBSERVED = 16  # packets of observers at one endpoint

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.basics.latest import keep_latest
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Outgoing, Peer, Place
-from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import MAGIC_V2, Packet

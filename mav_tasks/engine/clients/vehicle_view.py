@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import exp, inf, log
 from typing import NamedTuple
 
-from mav_tasks.services.interval_requester import WANTED
+from mav_tasks.engine.services.interval_requester import WANTED
 
 #: What REQUEST_DATA_STREAM names at once, by MAV_DATA_STREAM: message ids, as ArduPilot's rovers
 #: have them. ALL are the messages that vehicles send as streams, and only these are thinned:

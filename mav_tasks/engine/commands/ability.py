@@ -2,12 +2,12 @@
 
 from typing import TypeVar
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Turning
+from mav_tasks.engine.services.persona import Persona
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.errors import Rejection
 from mav_tasks.kinds import GoTo, SingleGoal
 from mav_tasks.kinds.base import Ability
-from mav_tasks.services.persona import Persona
-from mav_tasks.settings import Turning
 from mav_tasks.tasks.goal import Step
 from mav_tasks.tasks.lifecycle import TaskReason
 

@@ -13,6 +13,8 @@ from collections.abc import Hashable
 from dataclasses import replace
 from functools import partial
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
@@ -25,14 +27,12 @@ from mav_tasks.engine.commands.submissions import GIVEN_UP, NONCE, Submissions, 
 from mav_tasks.engine.commands.translate import message_id_of, task_id_of
 from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.engine.policy import is_task_command
+from mav_tasks.engine.services.commands import Answer, Command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult
-from mav_tasks.services.commands import Answer, Command
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, reused
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason
 from mav_tasks.tasks.pending_tasks import PendingTasks

@@ -10,15 +10,15 @@ from collections.abc import Callable, Container, Iterable, Sequence
 from math import inf, isnan, nan
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.commands.ability import ability_of, adapted, check_reach
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.joint_control import client_driving
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection
 from mav_tasks.kinds import GoTo, LocalPlace, Pose, SingleGoal
 from mav_tasks.kinds.path import distance
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.driving.estimate import Estimate
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import present_goal

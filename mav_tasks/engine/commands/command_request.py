@@ -3,6 +3,7 @@
 from collections.abc import Hashable, Iterator
 from typing import Self
 
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands import translate
@@ -16,12 +17,11 @@ from mav_tasks.engine.policy import (
     Row,
     row_of_command,
 )
+from mav_tasks.engine.services.commands import NO_MESSAGE, REPEATED, Answer, Command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.commands import NO_MESSAGE, REPEATED, Answer, Command
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Marks, Submitter

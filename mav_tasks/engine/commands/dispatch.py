@@ -8,6 +8,7 @@ through ``deliver``.
 from dataclasses import dataclass
 from functools import partial
 
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import Received
@@ -29,13 +30,12 @@ from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
+from mav_tasks.engine.services.commands import COPIED, Answer, Command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.commands import COPIED, Answer, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
 

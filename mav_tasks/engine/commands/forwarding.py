@@ -9,6 +9,8 @@ from collections.abc import Hashable, Iterable
 from math import isfinite
 from typing import Any, NamedTuple
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import ROLES
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.refusals import Refusals
@@ -20,20 +22,18 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.translate import IN_FORCE
 from mav_tasks.engine.inputs import Peer, Place
 from mav_tasks.engine.policy import Kind, Row
+from mav_tasks.engine.services import file_transfer
+from mav_tasks.engine.services.commands import Answer, Answered, Standing
+from mav_tasks.engine.services.orders import Phase, moves
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import file_transfer
-from mav_tasks.services.commands import Answer, Answered, Standing
-from mav_tasks.services.orders import Phase, moves
-from mav_tasks.settings import ROLES
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, STOP_IN_FORCE, TaskReason
 
 NO_PLACE = 7  # type_mask that ignores x, y and z

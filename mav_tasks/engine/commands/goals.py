@@ -10,8 +10,10 @@ from hashlib import blake2b
 from math import degrees, inf, isinf, isnan, nan, radians, tau
 from struct import Struct
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Driving
 from mav_tasks.engine.policy import TASK_COMMANDS
-from mav_tasks.errors import Rejection
+from mav_tasks.engine.services.commands import Command
 from mav_tasks.kinds import (
     Drive,
     Face,
@@ -28,8 +30,6 @@ from mav_tasks.kinds import (
 from mav_tasks.kinds.wait import DAY, HOUR, MINUTE
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import EXACT, large_number
-from mav_tasks.services.commands import Command
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Marks, Terms
 

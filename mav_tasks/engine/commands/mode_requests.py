@@ -7,6 +7,7 @@ acknowledgement: its sender waits until a heartbeat shows the mode.
 from dataclasses import dataclass
 from functools import partial
 
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import Rights
@@ -17,7 +18,6 @@ from mav_tasks.engine.missions.plans import MISSION, Plans
 from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.parts import Starter
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.errors import Rejection
 from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity

@@ -10,12 +10,12 @@ it may read old packets of one link after newer ones of another.
 
 from math import inf, isfinite
 
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.clients.rights import SUBMITTER
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import Kind
-from mav_tasks.errors import Rejection
+from mav_tasks.engine.services.commands import COPIED, DOUBLED, Command
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.services.commands import COPIED, DOUBLED, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: index of the parameter with the halt epoch that the sender was shown, by command

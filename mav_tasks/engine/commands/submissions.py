@@ -3,6 +3,8 @@
 from collections.abc import Hashable
 from functools import partial
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
@@ -20,11 +22,9 @@ from mav_tasks.engine.commit_gate import CommitGate, DependencyQuestions
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.engine.timers import Effect, Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.errors import Rejection
 from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, SubmissionDeduplicator
 from mav_tasks.tasks.forecast import known_when_empty
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, words_of

@@ -5,13 +5,13 @@
 
 from math import isfinite, nan
 
+from mav_tasks.config.settings import SET_FAILSAFE
+from mav_tasks.engine.services.commands import Command
 from mav_tasks.kinds import GoTo, Leg, Unit
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.float_param import EXACT, large_number
-from mav_tasks.services.commands import Command
-from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.driving.estimate import time_left
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.events import (

@@ -7,8 +7,10 @@ sources would contradict each other.
 
 from math import inf
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.missions.plan_items import performed
 from mav_tasks.engine.missions.transfer import MissionParts
+from mav_tasks.engine.services.missions import item_at
 from mav_tasks.engine.timers import Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.kinds import Act
@@ -16,8 +18,6 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.missions import item_at
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import (
     ActTold,
     Event,

@@ -12,6 +12,7 @@ from dataclasses import replace
 from math import hypot, isnan
 from typing import Any, NamedTuple
 
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.commands.ability import adapted
 from mav_tasks.engine.commands.goals import (
     GLOBAL_FRAMES,
@@ -29,13 +30,12 @@ from mav_tasks.engine.missions.plan_table import (
     row_of_item,
     step_of_command,
 )
-from mav_tasks.errors import Rejection
+from mav_tasks.engine.services.commands import NO_MESSAGE, Command
+from mav_tasks.engine.services.missions import Item, packed, unpacked
 from mav_tasks.kinds import GlobalPlace, GoTo, Place
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
-from mav_tasks.services.commands import NO_MESSAGE, Command
-from mav_tasks.services.missions import Item, packed, unpacked
 from mav_tasks.tasks.driving.fence import Circle, Fence, Polygon, Zone, check
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import loops_in_vain

@@ -11,6 +11,8 @@ from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Driving
 from mav_tasks.engine.commands.ability import ability_of
 from mav_tasks.engine.commands.goals import (
     MAX_DELAY,
@@ -24,16 +26,14 @@ from mav_tasks.engine.commands.goals import (
     whole,
 )
 from mav_tasks.engine.policy import row_of_command
-from mav_tasks.errors import Rejection
+from mav_tasks.engine.services.commands import NO_MESSAGE, Command
+from mav_tasks.engine.services.missions import NOT_GIVEN
+from mav_tasks.engine.services.persona import Persona
 from mav_tasks.kinds import Act, GoTo, Place, Wait
 from mav_tasks.kinds.act import LONGEST, TIME_LIMIT
 from mav_tasks.kinds.base import Ability
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
-from mav_tasks.services.commands import NO_MESSAGE, Command
-from mav_tasks.services.missions import NOT_GIVEN
-from mav_tasks.services.persona import Persona
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import Delay, Jump, Near, Nothing, Perform, SetReverse, SetSpeed, Step
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, Terms

@@ -15,6 +15,8 @@ from math import inf
 from typing import Protocol
 from zlib import crc32
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.commands.ability import check_reach
 from mav_tasks.engine.commands.assignments import check_any, driven_by
@@ -43,16 +45,14 @@ from mav_tasks.engine.missions.plans import (
 )
 from mav_tasks.engine.missions.transfer import MissionParts, Sender, Transfer, Upload
 from mav_tasks.engine.policy import GO_TO, row_of
+from mav_tasks.engine.services.commands import NO_MESSAGE, Command
+from mav_tasks.engine.services.missions import Item, item_of, packed
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.errors import Rejection
 from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.commands import NO_MESSAGE, Command
-from mav_tasks.services.missions import Item, item_of, packed
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import reused
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import Plan, Step, number_of

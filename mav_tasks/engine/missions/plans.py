@@ -8,14 +8,14 @@ from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.missions.plan_items import fence_of, place_of, plan_of, steps_of
 from mav_tasks.engine.missions.plan_table import MissionParseOptions
+from mav_tasks.engine.services.missions import count_of, unpacked
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
-from mav_tasks.services.missions import count_of, unpacked
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of

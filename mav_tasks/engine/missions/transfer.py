@@ -10,6 +10,9 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.basics.latest import keep_latest
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.assignments import Assignments
@@ -19,15 +22,7 @@ from mav_tasks.engine.inputs import Place
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.missions.plan_table import MissionParseOptions
 from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored
-from mav_tasks.engine.timers import Timers, Turn
-from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.errors import Rejection
-from mav_tasks.latest import keep_latest
-from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavMissionResult
-from mav_tasks.services.missions import (
+from mav_tasks.engine.services.missions import (
     CAPACITY,
     Item,
     count_of,
@@ -37,7 +32,12 @@ from mav_tasks.services.missions import (
     message_of,
     packed,
 )
-from mav_tasks.settings import Settings
+from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavMissionResult
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import Step
 from mav_tasks.tasks.lifecycle import TaskReason

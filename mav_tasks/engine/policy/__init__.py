@@ -17,8 +17,8 @@ from mav_tasks.engine.policy.commands import (
     Row,
 )
 from mav_tasks.engine.policy.messages import BOUNDING_PLAN, GO_TO_ITEM, MESSAGES, READ_FILE
+from mav_tasks.engine.services import file_transfer
 from mav_tasks.mavlink import messages as m
-from mav_tasks.services import file_transfer
 
 __all__ = [
     "COMMANDS",

@@ -9,8 +9,8 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from math import inf
 
-from mav_tasks.latest import keep_latest
-from mav_tasks.services.persona import Persona
+from mav_tasks.basics.latest import keep_latest
+from mav_tasks.engine.services.persona import Persona
 from mav_tasks.tasks.halts import Halts, Permit
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind

@@ -11,6 +11,8 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple, assert_never
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.engine.services.orders import Phase
 from mav_tasks.engine.vehicles.authority import SHOWN_LATE
 from mav_tasks.engine.vehicles.control import (
     NOTHING,
@@ -26,9 +28,7 @@ from mav_tasks.engine.vehicles.control import (
 )
 from mav_tasks.engine.vehicles.parts import HoldBefore, Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
-from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import Address
-from mav_tasks.services.orders import Phase
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, RUNNING, TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId

@@ -26,9 +26,9 @@ from math import inf
 from operator import itemgetter
 from typing import NamedTuple
 
+from mav_tasks.engine.services.orders import Phase
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.parts import Parts
-from mav_tasks.services.orders import Phase
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 

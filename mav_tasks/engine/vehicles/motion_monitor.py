@@ -19,12 +19,12 @@ from collections import deque
 from math import cos, hypot, inf, isfinite, sin
 from typing import NamedTuple
 
+from mav_tasks.config.settings import Watch
 from mav_tasks.engine.vehicles.sender_clock import Heard, SenderClock
 from mav_tasks.kinds import Pose
 from mav_tasks.kinds.guidance import Motion
 from mav_tasks.kinds.path import wrap
 from mav_tasks.mavlink.messages import Attitude, LocalPositionNed
-from mav_tasks.settings import Watch
 
 WINDOW = 1.0  # s over which the displacement alone decides
 KEPT = 6.0  # s of samples, for the longest window and for learning

@@ -15,10 +15,10 @@ import re
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.engine.services.statustext import TextReceiver
+from mav_tasks.engine.services.vehicle_status import is_outside_fence
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.messages import Statustext, SysStatus
-from mav_tasks.services.statustext import TextReceiver
-from mav_tasks.services.vehicle_status import is_outside_fence
 
 FENCE = "its own fence"
 TOLD_WITHIN = 1.5  # s after a mode change in which the cause may be reported

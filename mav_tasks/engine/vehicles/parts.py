@@ -6,18 +6,18 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.basics.errors import Rejection
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.packets import LeaseWatch
+from mav_tasks.engine.services.offboard import OffboardControl, Refused
+from mav_tasks.engine.services.persona import Persona
+from mav_tasks.engine.services.vehicle_status import HeartbeatMonitor
 from mav_tasks.engine.vehicles.authority import Armings, Authority
 from mav_tasks.engine.vehicles.own_failsafes import OwnFailsafes
 from mav_tasks.engine.vehicles.shown import ShownHeartbeat, StickWatch
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
-from mav_tasks.errors import Rejection
-from mav_tasks.services.offboard import OffboardControl, Refused
-from mav_tasks.services.persona import Persona
-from mav_tasks.services.vehicle_status import HeartbeatMonitor
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.halts import Permit
 from mav_tasks.tasks.lifecycle import TaskReason

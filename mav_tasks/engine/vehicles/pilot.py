@@ -6,10 +6,10 @@ It checks that the vehicle obeys. A finding about a task is an event for the con
 from collections.abc import Callable
 from math import inf
 
+from mav_tasks.engine.services.offboard import REGAINED_UNSEEN
+from mav_tasks.engine.services.orders import Phase, Posture, Speeds
 from mav_tasks.engine.vehicles.motion_guard import MotionGuard, Seen
 from mav_tasks.engine.vehicles.parts import Parts
-from mav_tasks.services.offboard import REGAINED_UNSEEN
-from mav_tasks.services.orders import Phase, Posture, Speeds
 from mav_tasks.tasks.goal import ends_at_home
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Task

@@ -5,12 +5,12 @@ when setpoints end. A profile (``mav-tasks probe``) is valid for one unique id a
 that does not match is reported, and not used.
 """
 
+from mav_tasks.config.settings import SET_FAILSAFE, Settings, Turning, VehicleProfile
+from mav_tasks.engine.services import loss_failsafe as loss
+from mav_tasks.engine.services.persona import Persona, with_turning, with_yaw_rate
+from mav_tasks.engine.services.vehicle_status import VehicleIdentity
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.mavlink import messages as m
-from mav_tasks.services import loss_failsafe as loss
-from mav_tasks.services.persona import Persona, with_turning, with_yaw_rate
-from mav_tasks.services.vehicle_status import VehicleIdentity
-from mav_tasks.settings import SET_FAILSAFE, Settings, Turning, VehicleProfile
 
 NO_MISSION = (0, 0xFFFF)  # MISSION_CURRENT.total: it does not say; there is none
 

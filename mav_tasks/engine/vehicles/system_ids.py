@@ -20,6 +20,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from mav_tasks.engine.inputs import Place
+from mav_tasks.engine.services.vehicle_status import uid_of
 from mav_tasks.engine.vehicles.sender_clock import Stamped
 from mav_tasks.mavlink.messages import (
     Attitude,
@@ -30,7 +31,6 @@ from mav_tasks.mavlink.messages import (
     Timesync,
 )
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.vehicle_status import uid_of
 
 SILENT = 0.5  # s; telemetry radios delay packets by less, and position data is lost after 1 s
 UNANSWERED = 3.5  # s, as heartbeats that stay away: two requests or answers in a row may be lost

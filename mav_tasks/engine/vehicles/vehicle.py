@@ -9,9 +9,19 @@ from collections.abc import Hashable
 from math import inf
 from typing import Any, NamedTuple
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.packets import LeaseWatch, PacketSender
 from mav_tasks.engine.policy import Kind, row_of_command
+from mav_tasks.engine.services.commands import COPIED, DOUBLED, Standing
+from mav_tasks.engine.services.persona import Persona
+from mav_tasks.engine.services.vehicle_status import (
+    HeartbeatMonitor,
+    charge_of,
+    identity_of,
+    kind_of,
+    uid_of,
+)
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.joint_control import JointControl, Word
@@ -28,16 +38,6 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.commands import COPIED, DOUBLED, Standing
-from mav_tasks.services.persona import Persona
-from mav_tasks.services.vehicle_status import (
-    HeartbeatMonitor,
-    charge_of,
-    identity_of,
-    kind_of,
-    uid_of,
-)
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.halts import LastHalt, Permit
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
 from mav_tasks.tasks.lifecycle import TaskState as S

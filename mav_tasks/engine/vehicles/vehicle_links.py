@@ -6,21 +6,21 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
+from mav_tasks.basics.latest import keep_latest
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged, Place
 from mav_tasks.engine.packets import LeaseWatch, PacketSender
+from mav_tasks.engine.services.rate_budget import LinkBudget
+from mav_tasks.engine.services.token_bucket import TokenBucket
+from mav_tasks.engine.services.vehicle_status import INTERVAL, gcs_heartbeat
 from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.system_ids import NANO, Way
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.rate_budget import LinkBudget
-from mav_tasks.services.token_bucket import TokenBucket
-from mav_tasks.services.vehicle_status import INTERVAL, gcs_heartbeat
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.registry import TaskRegistry

@@ -8,12 +8,12 @@ is a place, and no autopilot promises that its frame begins there.
 from collections.abc import Sequence
 from math import hypot, inf
 
+from mav_tasks.config.settings import Watch
 from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.kinds import GlobalPlace, GoTo, LocalPlace
 from mav_tasks.kinds.path import distance
 from mav_tasks.mavlink.messages import Attitude, GlobalPositionInt, GpsGlobalOrigin, HomePosition
-from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.frames import local_place, origin_of, to_local
 from mav_tasks.tasks.goal import Step

@@ -6,23 +6,23 @@ It decides nothing but the order in which packets leave.
 from collections.abc import Callable, Hashable
 from math import inf
 
+from mav_tasks.config.settings import Watch
 from mav_tasks.engine.inputs import Outgoing, Place
 from mav_tasks.engine.packets import PacketSender
 from mav_tasks.engine.policy import row_of_command
+from mav_tasks.engine.services import loss_failsafe, statustext
+from mav_tasks.engine.services.commands import Answered, CommandSender, Standing
+from mav_tasks.engine.services.interval_requester import IntervalRequester
+from mav_tasks.engine.services.missions import Done, Item, MissionUploader
+from mav_tasks.engine.services.offboard import OffboardControl, is_request_of
+from mav_tasks.engine.services.orders import Phase, moves
+from mav_tasks.engine.services.own_parameters import OwnParameters
+from mav_tasks.engine.services.persona import Persona
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import loss_failsafe, statustext
-from mav_tasks.services.commands import Answered, CommandSender, Standing
-from mav_tasks.services.interval_requester import IntervalRequester
-from mav_tasks.services.missions import Done, Item, MissionUploader
-from mav_tasks.services.offboard import OffboardControl, is_request_of
-from mav_tasks.services.orders import Phase, moves
-from mav_tasks.services.own_parameters import OwnParameters
-from mav_tasks.services.persona import Persona
-from mav_tasks.settings import Watch
 from mav_tasks.tasks.halts import Halts
 
 ASK_WHICH = 5  # times that a vehicle is asked for AUTOPILOT_VERSION

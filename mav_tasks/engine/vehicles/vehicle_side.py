@@ -10,7 +10,11 @@ from collections.abc import Set as AbstractSet
 from functools import partial
 from math import inf
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import Outgoing, Peer, Place
+from mav_tasks.engine.services.orders import DRIVEN, Orders, Phase
+from mav_tasks.engine.services.persona import ARDUPILOT, Persona, persona_of
+from mav_tasks.engine.services.vehicle_status import gcs_heartbeat, kind_of
 from mav_tasks.engine.snapshot import Reach
 from mav_tasks.engine.timers import Timer, Turn
 from mav_tasks.engine.vehicles.control import Event
@@ -23,10 +27,6 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.orders import DRIVEN, Orders, Phase
-from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
-from mav_tasks.services.vehicle_status import gcs_heartbeat, kind_of
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks

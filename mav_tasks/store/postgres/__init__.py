@@ -3,7 +3,7 @@
 ``session`` sends SQL, ``ownership`` decides which server may write, ``database`` writes batches.
 """
 
-from mav_tasks.errors import StoreError, missing
+from mav_tasks.basics.errors import StoreError, missing
 
 try:
     import psycopg as psycopg

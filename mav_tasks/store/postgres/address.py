@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from psycopg import Error
 from psycopg.conninfo import conninfo_to_dict
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store.place import without_password
 
 FORM = "expected postgresql://USER@HOST:PORT/DATABASE"

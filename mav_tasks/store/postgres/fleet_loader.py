@@ -10,9 +10,9 @@ from dataclasses import replace
 from queue import SimpleQueue
 from threading import Event, Thread
 
-from mav_tasks.clock import boot_time
-from mav_tasks.errors import StoreError
-from mav_tasks.mailbox import Mailbox
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.basics.mailbox import Mailbox
 from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome, VehiclesLoaded
 from mav_tasks.store.holder import Replaced
 from mav_tasks.store.postgres.address import Address

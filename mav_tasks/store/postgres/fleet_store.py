@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
 
-from mav_tasks.settings import Retention
+from mav_tasks.config.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import Evicted, HaltsKept, IdsGranted, NotKept, Outcome
 from mav_tasks.store.durable import CLOSE_LIMIT, DurableStore

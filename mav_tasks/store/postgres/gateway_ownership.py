@@ -1,6 +1,6 @@
 """A gateway's right to write the store of its fleet: as long as its lease has the same epoch.
 
-The tables of leases (``fleet_io``) say who is in the fleet. Each transaction begins with ``fence``,
+The tables of leases (``fleet/io``) say who is in the fleet. Each transaction begins with ``fence``,
 which fails unless the gateway's row has this epoch. It locks the row against the end of the lease,
 which takes the row for itself first, but not against renewals, so that a write that hangs does not
 cost the lease. So once a lease has ended, a transaction under it has either been committed before

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from platformdirs import user_data_path
 
-from mav_tasks.errors import StoreError
-from mav_tasks.folders import make_private
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.basics.folders import make_private
 
 
 def local_path(database: str, fleet: str, *, name: str) -> Path:

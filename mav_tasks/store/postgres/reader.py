@@ -2,7 +2,7 @@
 
 from contextlib import AbstractContextManager
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import failure

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 
-from mav_tasks.settings import Retention
+from mav_tasks.config.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import Which
 from mav_tasks.store.durable import DurableStore

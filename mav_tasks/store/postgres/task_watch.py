@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from contextlib import closing
 from threading import Thread
 
-from mav_tasks.clock import boot_time
-from mav_tasks.mailbox import Mailbox
+from mav_tasks.basics.clock import boot_time
+from mav_tasks.basics.mailbox import Mailbox
 from mav_tasks.store.base import Outcome, TaskStates
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.dependencies import CHANNEL

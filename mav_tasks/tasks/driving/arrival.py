@@ -10,6 +10,7 @@ the settling distance is good enough, and the task's status shows it.
 
 from math import radians
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import Unit
 from mav_tasks.kinds.guidance import (
     APPROACH_GAIN,
@@ -20,7 +21,6 @@ from mav_tasks.kinds.guidance import (
     Slowest,
     Velocity,
 )
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.path_follower import PathFollower
 
 CORRECTIONS = 2  # corrections of the end from a standstill

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, copysign, isfinite, sqrt
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import GlobalPlace, GoTo, Pose, SingleGoal
 from mav_tasks.kinds.guidance import ZERO, Motion, Velocity, clamped
 from mav_tasks.kinds.path import distance, pose_on, rest_of, wrap
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Fence, LocalFence
 from mav_tasks.tasks.driving.frames import local_place, to_local
 from mav_tasks.tasks.driving.mission_sequencer import ways_on

@@ -7,11 +7,11 @@ from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
+from mav_tasks.config.settings import Driving, Settings
 from mav_tasks.kinds import Act, GoTo
 from mav_tasks.kinds.act import ACCEPTED, TOLD
 from mav_tasks.kinds.base import Ability
 from mav_tasks.kinds.guidance import ZERO, Motion
-from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.bounds import Bounds, limited, within_fence

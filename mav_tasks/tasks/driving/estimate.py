@@ -8,9 +8,9 @@ from dataclasses import replace
 from math import nan
 from typing import NamedTuple
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import GlobalPlace, GoTo, Pose, SingleGoal
 from mav_tasks.kinds.base import WAY
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.frames import local_place
 from mav_tasks.tasks.driving.mission_sequencer import begun, following, is_over, present_goal
 from mav_tasks.tasks.goal import Goal, Plan, SetSpeed

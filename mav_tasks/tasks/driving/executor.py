@@ -6,9 +6,9 @@ velocity waits until EXECUTING is durable; zeros never wait.
 
 from dataclasses import dataclass, replace
 
-from mav_tasks.histogram import Histogram
+from mav_tasks.basics.histogram import Histogram
+from mav_tasks.config.settings import Settings
 from mav_tasks.kinds import Pose
-from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.drive import Becomes, Drive

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, replace
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import GoTo, Leg, Pose, SingleGoal, Unit
 from mav_tasks.kinds.base import FACE, WAY
 from mav_tasks.kinds.guidance import USUAL, Motion, Situation, Slowest, Velocity
 from mav_tasks.kinds.path import distance
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.legs import begun_leg
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.task import Progress

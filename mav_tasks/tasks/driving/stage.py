@@ -8,6 +8,7 @@ would have ended.
 from dataclasses import replace
 from math import pi, radians
 
+from mav_tasks.config.settings import Driving, Turning
 from mav_tasks.kinds import GoTo, LocalPlace, Pose, SingleGoal
 from mav_tasks.kinds.base import FACE, ON_SPOT, TURNED, WAY, is_turned
 from mav_tasks.kinds.guidance import Motion, bend_speed, corner_speed
@@ -18,7 +19,6 @@ from mav_tasks.kinds.path import (
     pose_on,
     wrap,
 )
-from mav_tasks.settings import Driving, Turning
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.legs import begun_leg
 from mav_tasks.tasks.driving.mission_sequencer import goal_of, goes_on_to_a_place

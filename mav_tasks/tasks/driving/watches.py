@@ -9,11 +9,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import copysign, inf, pi, radians
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import Pose, Unit
 from mav_tasks.kinds.base import OFF_TRACK
 from mav_tasks.kinds.guidance import Motion, Velocity, is_far_off
 from mav_tasks.kinds.path import distance, forward_of, wrap
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.stage import is_off_line
 from mav_tasks.tasks.task import Task, TaskId

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from mav_tasks.errors import RecordError
+from mav_tasks.basics.errors import RecordError
 from rover_sim.bullet import NO_PYBULLET, has_pybullet
 from rover_sim.demo import fast, real
 from rover_sim.demo.processes import DemoError

@@ -2,10 +2,10 @@
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
+from mav_tasks.config.settings import Recording, Settings
 from mav_tasks.links.memory import MemoryLink, MemoryNet
 from mav_tasks.recording import observers
-from mav_tasks.settings import Recording, Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK, InMemoryServer
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.demo.screen import Screen

@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
+from mav_tasks.basics.errors import MavTasksError, NoAnswer
 from mav_tasks.client.sync import SyncClient, SyncTask
-from mav_tasks.errors import MavTasksError, NoAnswer
 from mav_tasks.kinds import Move
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from rover_sim.demo.processes import STOP_LIMIT, DemoError, free_ports, process

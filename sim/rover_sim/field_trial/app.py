@@ -16,7 +16,7 @@ from contextlib import AsyncExitStack, suppress
 from functools import partial
 from pathlib import Path
 
-from mav_tasks.errors import MavTasksError
+from mav_tasks.basics.errors import MavTasksError
 from rover_sim.field_trial.ground import Limits
 from rover_sim.field_trial.real_ground import RealGround
 from rover_sim.field_trial.rows import Row, Verdict, table

@@ -3,8 +3,8 @@
 import asyncio
 from contextlib import suppress
 
+from mav_tasks.basics.errors import ClientError, NoAnswer, Refused
 from mav_tasks.client.handle import Task
-from mav_tasks.errors import ClientError, NoAnswer, Refused
 from mav_tasks.kinds import Move
 from rover_sim.field_trial.rows import Row, judged, not_tried
 from rover_sim.field_trial.session import Session, TrialError

@@ -5,8 +5,8 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
+from mav_tasks.basics.errors import ClientError, NoAnswer, Refused
 from mav_tasks.client.handle import Task
-from mav_tasks.errors import ClientError, NoAnswer, Refused
 from mav_tasks.kinds import Move
 from mav_tasks.tasks.lifecycle import TaskState
 from rover_sim.field_trial.rows import Row, judged, not_tried

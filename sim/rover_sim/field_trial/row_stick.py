@@ -3,7 +3,7 @@
 import asyncio
 from enum import Enum
 
-from mav_tasks.errors import ClientError
+from mav_tasks.basics.errors import ClientError
 from mav_tasks.kinds import Move
 from rover_sim.field_trial.rows import Row, judged, not_tried
 from rover_sim.field_trial.session import Session, TrialError, quietly

@@ -3,7 +3,7 @@
 import asyncio
 from statistics import median
 
-from mav_tasks.errors import Refused
+from mav_tasks.basics.errors import Refused
 from mav_tasks.kinds import Drive
 from rover_sim.field_trial.pilot import Pilot, Way, better
 from rover_sim.field_trial.rows import Row, judged, not_tried

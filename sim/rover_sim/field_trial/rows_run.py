@@ -2,7 +2,7 @@
 
 from collections.abc import Awaitable, Callable, Collection, Sequence
 
-from mav_tasks.errors import ClientError
+from mav_tasks.basics.errors import ClientError
 from rover_sim.field_trial import row_boot, row_restarts, row_stick, row_stop, row_tasks
 from rover_sim.field_trial.rows import Row, judged
 from rover_sim.field_trial.session import Session, TrialError

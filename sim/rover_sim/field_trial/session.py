@@ -6,11 +6,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
+from mav_tasks.basics.errors import ClientError, NoAnswer, Refused, UsageError
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import TaskStatus, VehicleStatus
 from mav_tasks.client.wire import Goal
-from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from rover_sim.field_trial.ground import Ground, Limits
 from rover_sim.field_trial.track import Place, Track

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Literal
 
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
 from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 
 STATUSTEXT = 253
 MESSAGE_ID = slice(7, 10)  # in a MAVLink 2 packet

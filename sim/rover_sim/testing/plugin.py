@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mav_tasks.client.sync import SyncClient
-    from mav_tasks.settings import Settings
+    from mav_tasks.config.settings import Settings
     from rover_sim.testing.lossy import LossyLink
     from rover_sim.testing.options import RoverOptions
     from rover_sim.testing.processes import RealTime
@@ -82,7 +82,7 @@ def pytest_runtest_makereport(
 @pytest.fixture
 def task_server_settings() -> Settings:
     """Return the task server's settings; override or parametrize this fixture to change them."""
-    from mav_tasks.settings import Settings  # noqa: PLC0415
+    from mav_tasks.config.settings import Settings  # noqa: PLC0415
 
     return Settings()
 

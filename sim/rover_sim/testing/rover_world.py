@@ -13,9 +13,9 @@ from typing import Any, TypeVar
 
 from mav_tasks.client.aio import Client
 from mav_tasks.client.sync import SyncClient
-from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.config.settings import Settings
 from mav_tasks.links.memory import MemoryLink
-from mav_tasks.settings import Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.errors import NotInVirtualTime, Stalled

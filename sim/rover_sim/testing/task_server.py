@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mav_tasks.in_memory import InMemoryServer
-from mav_tasks.settings import Retention, Settings
+from mav_tasks.config.settings import Retention, Settings
+from mav_tasks.shell.in_memory import InMemoryServer
 from mav_tasks.store import MemoryStore
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import Event

@@ -9,6 +9,7 @@ from random import Random
 from struct import Struct, unpack_from
 from typing import Any
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import (
     FLEET_LINK,
     FleetChanged,
@@ -21,11 +22,10 @@ from mav_tasks.engine.inputs import (
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Change, Member, Request
 from mav_tasks.fleet.standing import Effect, Standing
-from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import MemoryLink
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import Settings
+from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.store import (
     Evicted,
     IdsGranted,

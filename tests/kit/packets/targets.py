@@ -7,18 +7,18 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from struct import pack
 
+from mav_tasks.basics.errors import ConfigError, LinkUrlError, PlanFileError
 from mav_tasks.config.configuration import merged
 from mav_tasks.config.toml_file import decoded, layer_of
-from mav_tasks.errors import ConfigError, LinkUrlError, PlanFileError
 from mav_tasks.links.endpoint import HostUrl
 from mav_tasks.links.serial import SerialUrl
 from mav_tasks.links.url import parse_url
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.packet import MAX_PACKET, split_datagram, with_seq
 from mav_tasks.mavlink.stream import StreamSplitter
-from mav_tasks.plan_files import fence_items, rally_items
-from mav_tasks.plan_files.reader import parse_plan_bytes
-from mav_tasks.plan_files.writer import format_plan
+from mav_tasks.plans import fence_items, rally_items
+from mav_tasks.plans.reader import parse_plan_bytes
+from mav_tasks.plans.writer import format_plan
 
 Target = Callable[[bytes], None]
 JUMP = 177  # MAV_CMD_DO_JUMP

@@ -1,7 +1,7 @@
 """The station on a memory net, as a party of a virtual world."""
 
-from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.links.memory import MemoryNet
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from tests.kit.qgc.client import Qgc
 from tests.kit.qgc.guided import Operator
 from tests.kit.qgc.plan_master import PlanMaster

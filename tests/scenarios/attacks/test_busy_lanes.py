@@ -5,8 +5,8 @@ A rover answers the requests for its messages one by one, over a radio ten a sec
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Roles, Settings
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, REQUEST, TEMPORARILY_REJECTED, FakeClient, command_long

@@ -7,7 +7,7 @@ was taken for a restart.
 
 import pytest
 
-from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona

@@ -11,7 +11,7 @@ from math import nan
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, PAUSE_CONTINUE, FakeClient, command_long

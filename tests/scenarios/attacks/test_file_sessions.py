@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Roles, Settings
+from mav_tasks.config.settings import Roles, Settings
 from tests.kit.cases import anew, for_each
 from tests.kit.client import FakeClient
 from tests.kit.world import World

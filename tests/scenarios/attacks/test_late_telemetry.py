@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import pytest
 
-from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.config.settings import Driving, Settings
 from mav_tasks.links.memory import Queue
-from mav_tasks.settings import Driving, Settings
+from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona

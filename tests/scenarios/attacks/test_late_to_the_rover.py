@@ -6,7 +6,7 @@ own words among them, may still come for some seconds; so may what a rover has s
 
 from struct import unpack_from
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode

@@ -5,7 +5,7 @@ millisecond later. The STOP was acknowledged, and the rover drove on.
 """
 
 from mav_tasks.engine.inputs import Packets
-from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each

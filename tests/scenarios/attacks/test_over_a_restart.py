@@ -5,7 +5,7 @@ What had left before the halt may still come, to the new server as well as to th
 
 from pathlib import Path
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, HOLD, MOVE, command_long

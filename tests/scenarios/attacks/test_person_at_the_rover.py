@@ -1,6 +1,6 @@
 """A person at the rover, whose hand the server sees late, or takes for its own doing."""
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED

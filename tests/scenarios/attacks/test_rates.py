@@ -8,10 +8,10 @@ by.
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.config.settings import Roles, Settings
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
-from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.links.memory import Radio
-from mav_tasks.settings import Roles, Settings
+from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import REQUEST, SET_INTERVAL, FakeClient, command_long
 from tests.kit.world import MODE_COMMAND, World

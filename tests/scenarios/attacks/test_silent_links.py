@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, RTL, command_long

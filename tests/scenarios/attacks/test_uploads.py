@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Roles, Settings
+from mav_tasks.config.settings import Roles, Settings
 from tests.kit.cases import anew, for_each
 from tests.kit.client import FakeClient, Received
 from tests.kit.mission import MISSION_ACK, REQUEST, REQUEST_INT, Ack, Item, Upload

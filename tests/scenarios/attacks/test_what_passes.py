@@ -8,7 +8,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as ap
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Roles, Settings
+from mav_tasks.config.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from tests.kit.cases import anew, for_each
 from tests.kit.client import DENIED, FakeClient

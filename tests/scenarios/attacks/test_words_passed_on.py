@@ -10,7 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Settings
+from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from mav_tasks import Client, Key, MavTasksError, NoAnswer, SyncClient
-from mav_tasks.errors import LinkDown
+from mav_tasks.basics.errors import LinkDown
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Heartbeat

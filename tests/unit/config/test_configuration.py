@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.basics.errors import ConfigError
 from mav_tasks.config import configuration
 from mav_tasks.config.configuration import Configuration, Sources
 from mav_tasks.config.sample import sample
+from mav_tasks.config.settings import KEYS, ServerSettings
 from mav_tasks.config.toml_file import layer_of
 from mav_tasks.config.words import VARIABLES, Flag, flag_of_set, variable_of
-from mav_tasks.errors import ConfigError
-from mav_tasks.settings import KEYS, ServerSettings
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.basics.errors import ConfigError
 from mav_tasks.config import profiles
 from mav_tasks.config.configuration import Sources
-from mav_tasks.errors import ConfigError
-from mav_tasks.settings import VehicleProfile
+from mav_tasks.config.settings import VehicleProfile
 
 FULL = VehicleProfile(
     system_id=7,

@@ -9,7 +9,7 @@ import pytest
 
 from mav_tasks.config.configuration import Sources
 from mav_tasks.config.reload import Reload
-from mav_tasks.settings import KEYS, Settings
+from mav_tasks.config.settings import KEYS, Settings
 
 SPEED = "driving.speed: 0.5 -> 0.8 m/s"
 NO_SPED = "driving.sped: no such key; did you mean driving.speed?"

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.basics.errors import ConfigError
 from mav_tasks.config.configuration import Configuration, merged
+from mav_tasks.config.settings import ServerSettings
 from mav_tasks.config.toml_file import LARGEST, layer_of, read_text
-from mav_tasks.errors import ConfigError
-from mav_tasks.settings import ServerSettings
 
 
 def read(text: str) -> Configuration:

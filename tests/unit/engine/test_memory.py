@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from mav_tasks.config.settings import Clients, Roles, Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Committed, LinkChanged, LinkSide, Packets, Peer
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.packet import split_datagram
-from mav_tasks.settings import Clients, Roles, Settings
 
 CONTINUE, SET_MODE, MOVE, MODIFY = 193, 176, 54000, 54012
 START_DELAY, DEADLINE = 2, 3

@@ -2,6 +2,7 @@
 
 import pytest
 
+from mav_tasks.config.settings import Settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
     Committed,
@@ -14,7 +15,6 @@ from mav_tasks.engine.inputs import (
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 
 OLD, NEW, CLIENT = ("10.0.0.1", 1), ("10.0.0.1", 2), ("10.0.0.9", 9)

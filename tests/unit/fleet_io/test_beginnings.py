@@ -7,10 +7,10 @@ from contextlib import closing
 
 import pytest
 
-from mav_tasks.errors import StoreError
-from mav_tasks.fleet_io.endpoint import Endpoint
-from mav_tasks.fleet_io.keeper import Keeper
-from mav_tasks.fleet_io.peers import Peers, Seen, Sign
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.fleet.io.endpoint import Endpoint
+from mav_tasks.fleet.io.keeper import Keeper
+from mav_tasks.fleet.io.peers import Peers, Seen, Sign
 from mav_tasks.store.postgres.address import parse
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import wait_until

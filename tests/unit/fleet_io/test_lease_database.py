@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.fleet.io.lease_database import LIMITS, LeaseDatabase
 from mav_tasks.fleet.member import Evict, Free, Join, Renew, Request, Row, Take
 from mav_tasks.fleet.rivals import Eviction
-from mav_tasks.fleet_io.lease_database import LIMITS, LeaseDatabase
 from mav_tasks.store.postgres.address import parse
 from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.session import Limits
@@ -139,7 +139,7 @@ def test_gateways_that_begin_at_one_time_make_the_tables_once(postgres: Postgres
 CHILD = """
 import sys
 from mav_tasks.fleet.member import Join
-from mav_tasks.fleet_io.lease_database import LeaseDatabase
+from mav_tasks.fleet.io.lease_database import LeaseDatabase
 from mav_tasks.store.postgres.address import parse
 it = LeaseDatabase(parse(sys.argv[1]), "a", host="127.0.0.1", port=1)
 it.execute(Join("a"))

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import SettingError
+from mav_tasks.basics.errors import SettingError
+from mav_tasks.config.setting_keys.parts import Part
+from mav_tasks.config.setting_keys.shapes import Number
 from mav_tasks.kinds import Act, Face, Move
 from mav_tasks.kinds.form import Form
 from mav_tasks.kinds.in_json import OWN
 from mav_tasks.kinds.plugged import plugged
-from mav_tasks.setting_keys.parts import Part
-from mav_tasks.setting_keys.shapes import Number
 
 EXAMPLES = Path(__file__).parents[3] / "tools" / "examples"
 #: what each surface knows of the kinds, one name on each line

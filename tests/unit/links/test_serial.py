@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import LinkOpenError
+from mav_tasks.basics.errors import LinkOpenError
 from mav_tasks.links import TO_CLIENTS, TO_VEHICLES, parse_url
 from mav_tasks.links.base import CountingLink, PacedLink, PeerChange, PeerState, StreamLink
 from tests.kit.lines import Device, device, read_from

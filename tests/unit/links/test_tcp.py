@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.errors import LinkOpenError
+from mav_tasks.basics.errors import LinkOpenError
 from mav_tasks.links import TO_CLIENTS, TO_VEHICLES, LinkLimits, parse_url
 from mav_tasks.links.base import Peer, PeerChange, PeerState, StreamLink
 from mav_tasks.links.tcp_in import TcpInLink, TcpInUrl

@@ -9,7 +9,7 @@ from typing import cast
 
 import pytest
 
-from mav_tasks.errors import LinkOpenError
+from mav_tasks.basics.errors import LinkOpenError
 from mav_tasks.links import TO_CLIENTS, TO_VEHICLES, LinkLimits, parse_url
 from mav_tasks.links.base import CountingLink, Link, Peer, StampedLink
 from tests.kit.processes import free_udp_ports, wait_until

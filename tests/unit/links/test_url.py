@@ -6,7 +6,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.errors import LinkUrlError
+from mav_tasks.basics.errors import LinkUrlError
 from mav_tasks.links import parse_url
 from tests.kit.commands import called
 

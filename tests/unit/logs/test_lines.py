@@ -7,13 +7,13 @@ import re
 import pytest
 
 from mav_tasks.engine.inputs import Congestion, LinkChanged, LinkSide, Packets, PeerChanged
-from mav_tasks.logs.field_notes import FieldNotes
-from mav_tasks.logs.lines import Lines, json_line
-from mav_tasks.logs.vehicle_texts import VehicleTexts
-from mav_tasks.logs.writing import ThreadedHandler
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Statustext
+from mav_tasks.shell.logs.field_notes import FieldNotes
+from mav_tasks.shell.logs.lines import Lines, json_line
+from mav_tasks.shell.logs.vehicle_texts import VehicleTexts
+from mav_tasks.shell.logs.writing import ThreadedHandler
 
 HEARD = """link x for vehicles
 rover 1 says: hot

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli.app import app
-from mav_tasks.errors import UsageError
+from mav_tasks.config.settings import Retention
 from mav_tasks.kinds import Drive, GlobalPlace, GoTo, Move, Pose, Wait
-from mav_tasks.settings import Retention
 from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks import events as e
 from mav_tasks.tasks.events import ParameterSet, SignatureRefused, SignaturesSeen

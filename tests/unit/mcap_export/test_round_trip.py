@@ -14,13 +14,13 @@ pytest.importorskip("mcap", reason="the extra mcap is not installed")
 
 from mcap.reader import NonSeekingReader, make_reader
 
-from mav_tasks.errors import RecordError, UsageError
+from mav_tasks.basics.errors import RecordError, UsageError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.layout import Layout
-from mav_tasks.mcap_export.convention import RAW
-from mav_tasks.mcap_export.exporting import Counts, export
+from mav_tasks.recording.mcap_export.convention import RAW
+from mav_tasks.recording.mcap_export.exporting import Counts, export
 from tests.kit.commands import session
 from tests.unit.mcap_export.json_schema import check, check_schema
 from tests.unit.recording.odd_packets import SIGNED, UNKNOWN, V1, WRONG_CRC

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from mav_tasks.basics.errors import UsageError
 from mav_tasks.engine.inputs import (
     AtOnce,
     Committed,
@@ -16,7 +17,6 @@ from mav_tasks.engine.inputs import (
     Shutdown,
     StoreFailed,
 )
-from mav_tasks.errors import UsageError
 from mav_tasks.links.link_limits import TO_VEHICLES
 from mav_tasks.links.url import parse_url
 from mav_tasks.metrics.collector import Collector

@@ -17,20 +17,20 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from mav_tasks.basics.errors import RecordError
 from mav_tasks.cli.app import app
+from mav_tasks.config.key_ring import ring_file
+from mav_tasks.config.key_ring.ring import Entry, KeyRing
+from mav_tasks.config.settings import Clients, Recording, Retention, Settings
 from mav_tasks.engine import inputs as i
 from mav_tasks.engine.inputs import Input, LinkSide, Packets, Shutdown, WallClock
-from mav_tasks.errors import RecordError
-from mav_tasks.in_memory import InMemoryServer
-from mav_tasks.key_ring import ring_file
-from mav_tasks.key_ring.ring import Entry, KeyRing
 from mav_tasks.kinds import Move, Pose
 from mav_tasks.links.memory import MemoryNet
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
+from mav_tasks.recording.observer import EngineObserver
 from mav_tasks.recording.reading import read
-from mav_tasks.settings import Clients, Recording, Retention, Settings
+from mav_tasks.shell.in_memory import InMemoryServer
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Marks, Progress, Submitter, Task, TaskId, Terms

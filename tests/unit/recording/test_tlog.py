@@ -13,6 +13,8 @@ os.environ.setdefault("MAVLINK20", "1")
 
 from pymavlink import mavutil
 
+from mav_tasks.basics.errors import RecordError
+from mav_tasks.config.settings import Recording, Settings
 from mav_tasks.engine.inputs import (
     AtOnce,
     Input,
@@ -22,15 +24,13 @@ from mav_tasks.engine.inputs import (
     Packets,
     WallClock,
 )
-from mav_tasks.errors import RecordError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Message
-from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
+from mav_tasks.recording.observer import EngineObserver
 from mav_tasks.recording.tlog import Tlog
-from mav_tasks.settings import Recording, Settings
 from tests.kit.processes import wait_until
 
 ROVER, SERVER, GCS, OUR_OWN = Address(1, 1), Address(1, 191), Address(255, 190), Address(250, 191)

@@ -5,9 +5,9 @@ from struct import pack, unpack
 
 import pytest
 
-from mav_tasks.errors import SettingError
-from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
-from mav_tasks.settings import Driving, Queueing, Settings
+from mav_tasks.basics.errors import SettingError
+from mav_tasks.config.parameter_table import PARAMETERS, as_sent, changed, with_all
+from mav_tasks.config.settings import Driving, Queueing, Settings
 
 
 def single(value: float) -> float:

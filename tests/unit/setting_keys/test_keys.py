@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.errors import SettingError
-from mav_tasks.setting_keys.key import check_bounds
-from mav_tasks.setting_keys.literals import literal
-from mav_tasks.setting_keys.shapes import (
+from mav_tasks.basics.errors import SettingError
+from mav_tasks.config.setting_keys.key import check_bounds
+from mav_tasks.config.setting_keys.literals import literal
+from mav_tasks.config.setting_keys.shapes import (
     ByClient,
     Choice,
     Flag,
@@ -21,7 +21,7 @@ from mav_tasks.setting_keys.shapes import (
     Text,
     Texts,
 )
-from mav_tasks.settings import BOUNDED, KEYS, ServerSettings
+from mav_tasks.config.settings import BOUNDED, KEYS, ServerSettings
 
 DEFAULTS = ServerSettings()
 

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from mav_tasks.config.settings import Retention
 from mav_tasks.kinds import Move
-from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, NotKept, Outcome, Store, kind_of
 from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState

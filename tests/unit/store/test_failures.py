@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.tasks.events import TaskSubmitted
 from tests.kit.databases import foreign, newer, tables
 from tests.kit.volume import some

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store import HaltNotKept
 from mav_tasks.tasks.events import (
     Event,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store import Store, Which, kind_of
 from mav_tasks.store.base import JournalReader
 from mav_tasks.tasks.events import Event, VehicleSeen

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from tests.kit.databases import tables
 from tests.unit.store.samples import (
     PATIENCE,

@@ -11,9 +11,9 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
+from mav_tasks.config.settings import Retention
 from mav_tasks.kinds import Pose
-from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, Which, kind_of, open_store
 from mav_tasks.tasks.events import (
     Event,

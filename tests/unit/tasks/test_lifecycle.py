@@ -2,7 +2,7 @@
 
 import pytest
 
-from mav_tasks.errors import IllegalTransition
+from mav_tasks.basics.errors import IllegalTransition
 from mav_tasks.tasks.lifecycle import (
     ACTIVE,
     INITIAL,

@@ -173,7 +173,7 @@ def test_every_fixture_does_its_part(pytester: pytest.Pytester) -> None:
         import asyncio
         import pytest
         from mav_tasks import Move, TaskState
-        from mav_tasks.settings import Driving, Settings
+        from mav_tasks.config.settings import Driving, Settings
 
         @pytest.fixture
         def task_server_settings():

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
+from mav_tasks.fleet.io.lease_database import Answer, LeaseDatabase
 from mav_tasks.fleet.member import Evict, Join, Renew, Request
 from mav_tasks.fleet.rivals import Eviction
-from mav_tasks.fleet_io.lease_database import Answer, LeaseDatabase
 from mav_tasks.store import Kept, Outcome
 from mav_tasks.store.postgres import address
 from mav_tasks.store.postgres.failures import PostgresError

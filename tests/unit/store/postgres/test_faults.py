@@ -284,7 +284,7 @@ def test_a_server_that_was_suspended_and_wakes_up_stores_nothing_any_more(
 
 def test_a_store_is_no_reason_to_import_psycopg() -> None:
     code = (
-        "import sys; import mav_tasks.serve; from mav_tasks.store import open_store;"
+        "import sys; import mav_tasks.shell.serve; from mav_tasks.store import open_store;"
         " open_store(':memory:'); print('psycopg' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,7 +7,7 @@ from contextlib import closing
 
 import pytest
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.fleet.member import Renew, Take
 from mav_tasks.store import Evicted, IdsGranted, VehiclesLoaded, Which, kind_of
 from mav_tasks.store.postgres.failures import PostgresError

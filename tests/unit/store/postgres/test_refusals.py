@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from mav_tasks.errors import StoreError
+from mav_tasks.basics.errors import StoreError
 from mav_tasks.store import Which, kind_of
 from tests.kit.databases import foreign, tables
 from tests.kit.postgres import PostgresServer

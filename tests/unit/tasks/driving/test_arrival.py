@@ -1,9 +1,9 @@
 """Where a rover stands that has been told to stop at the end: whether that is the end of it."""
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import GoTo, LocalPlace, Move, Pose
 from mav_tasks.kinds.base import WAY
 from mav_tasks.kinds.guidance import ZERO, Velocity
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering

@@ -4,10 +4,10 @@ from math import cos, hypot, pi, radians, sin
 
 import pytest
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import Drive, Move, Pose, SingleGoal
 from mav_tasks.kinds.base import OFF_TRACK
 from mav_tasks.kinds.guidance import ZERO, Motion, Velocity
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.watches import WRONG_WAY, AstrayWatch, JumpWatch
 from mav_tasks.tasks.task import Progress

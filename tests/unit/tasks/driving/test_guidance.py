@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import Move, Pose, Rotate, Wait
 from mav_tasks.kinds.guidance import CREEP_SPEED, ZERO, Situation, Velocity
 from mav_tasks.kinds.path import wrap
-from mav_tasks.settings import Driving
 from tests.unit.tasks.samples import motion
 
 DRIVING = Driving()

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.guidance import ZERO, Velocity
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.bounds import limited, safe_braking
 
 DRIVING = Driving(acceleration=0.5, turn_acceleration=2.0, max_speed=2.0, max_turn_rate=1.5)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import Bend, GlobalPlace, GoTo, LocalPlace, Pose
 from mav_tasks.kinds.follow import Follow
 from mav_tasks.kinds.guidance import Situation, bend_speed
@@ -19,7 +20,6 @@ from mav_tasks.kinds.path import (
     runs_of,
     wrap,
 )
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
 from mav_tasks.tasks.driving.frames import to_global
 from mav_tasks.tasks.driving.planner import (

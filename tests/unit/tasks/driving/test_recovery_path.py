@@ -7,11 +7,11 @@ from typing import Any
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds import Bend, Drive, GoTo, LocalPlace, Move, Pose, Rotate, SingleGoal, Wait
 from mav_tasks.kinds.base import OFF_TRACK, ON_SPOT, PAST_END
 from mav_tasks.kinds.guidance import Motion
 from mav_tasks.kinds.path import wrap
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering
 from mav_tasks.tasks.driving.stage import is_off_line, recovery_path, resumed, was_handled
