@@ -8,10 +8,13 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
+from fcntl import LOCK_EX, LOCK_NB, flock
+from functools import cache
 from itertools import cycle, islice
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any, TypeVar
 
 os.environ.setdefault("MAVLINK20", "1")
@@ -27,7 +30,7 @@ STOP_LIMIT = 30.0  # s
 BUSY = 3.0
 COPIED = 3.5  # s, within which the same request again is a copy
 PORTS = range(20_000, 32_000)  # below Linux's ephemeral ports, above 14550 and its like
-WORKERS = 8  # of pytest-xdist, in all runs at a time, each with its own ports
+SHARES = 24  # test processes at a time, of all runs, each with its own ports
 TOLD_OF_A_FAILURE = 8_000  # characters of each process's output
 
 
@@ -260,7 +263,8 @@ def free_udp_ports(count: int) -> list[int]:
 
 
 def _free_ports(count: int, kind: socket.SocketKind) -> list[int]:
-    return list(islice((port for port in _own_ports if _is_free(port, kind)), count))
+    ports = _ports_of_this_process()
+    return list(islice((port for port in ports if _is_free(port, kind)), count))
 
 
 def _is_free(port: int, kind: socket.SocketKind) -> bool:
@@ -272,21 +276,25 @@ def _is_free(port: int, kind: socket.SocketKind) -> bool:
     return True
 
 
+@cache
 def _ports_of_this_process() -> Iterator[int]:
-    """Yield ports that no other process of this run gets, each again only after all others.
+    """Return ports that no other test process of this machine gets, each again after all others.
 
     They lie below the system's ephemeral ports: a server keeps sending to a client that has just
     left, and pushes to ports where nobody may listen. The next user of such a port would receive
     that, and take another test's rover for its own.
     """
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    worker += int(os.environ.get("PORTS_OF", "0"))  # of a second run beside this one (tools/test)
-    own = PORTS[worker % WORKERS :: WORKERS]
-    begin = os.getpid() * 97 % len(own)  # concurrent runs start at different ports
-    return cycle((*own[begin:], *own[:begin]))
-
-
-_own_ports = _ports_of_this_process()
+    for number in range(SHARES):
+        lock = os.open(
+            Path(gettempdir(), f"mav-tasks-ports-{number}"), os.O_RDONLY | os.O_CREAT, 0o644
+        )
+        with suppress(BlockingIOError):
+            flock(lock, LOCK_EX | LOCK_NB)  # until this process ends
+            own = PORTS[number::SHARES]
+            begin = os.getpid() * 97 % len(own)  # who has them next starts elsewhere
+            return cycle((*own[begin:], *own[:begin]))
+        os.close(lock)
+    raise RuntimeError(f"{SHARES} test processes are at work already")
 
 
 def wait_for(
