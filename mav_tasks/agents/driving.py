@@ -1,4 +1,4 @@
-"""The tools that move and stop rovers: submit, cancel, release, stop, pause, resume."""
+"""The tools that move and stop rovers: submit, and those made from declared operations."""
 
 from typing import Any
 
@@ -7,17 +7,9 @@ from mav_tasks.agents.forms import DONE, TASK, task_form
 from mav_tasks.agents.reading import ID, ROVER
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
-from mav_tasks.client.parts import (
-    AFTER,
-    DEADLINE,
-    DELAY,
-    EPOCH,
-    GOALS,
-    HOW,
-    KEY_TEXT,
-    LABEL,
-    PRIORITY,
-)
+from mav_tasks.client.asking import ask, parts_of
+from mav_tasks.client.operations import OPERATION, OPERATIONS, Operation
+from mav_tasks.client.parts import AFTER, DEADLINE, DELAY, GOALS, KEY_TEXT, LABEL, PRIORITY
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Items, Number
 from mav_tasks.kinds.in_json import goal_schema
@@ -46,19 +38,6 @@ async def _submit(rovers: Rovers, values: Values, _report: Report) -> dict[str, 
     return task_form(await submission.submit(rovers, submission.Wish.of(vehicle, values)))
 
 
-async def _cancel(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
-    task = await rovers.task(values["id"])
-    await task.cancel()
-    return task_form(await task.refresh())
-
-
-async def _release(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
-    client = await rovers.client()
-    status = await rovers.status(values["id"])
-    await client.release(status.id, values["how"], epoch=values["epoch"], vehicle=status.vehicle)
-    return task_form(await client.status(status.id, vehicle=status.vehicle))
-
-
 async def _stop(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
     vehicle = values["vehicle"]  # any: STOP is never too much
     await rovers.unfound.stop(vehicle=vehicle)
@@ -66,23 +45,37 @@ async def _stop(rovers: Rovers, values: Values, _report: Report) -> dict[str, An
     return {"done": f"STOP is in force for {which}: no task runs until an operator resumes"}
 
 
-async def _pause(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
-    vehicle = await rovers.vehicle(values["vehicle"])
-    await (await rovers.client()).pause(vehicle=vehicle)
-    return {"done": f"rover {vehicle}: paused; its task continues on resume"}
+def _made(operation: Operation) -> Tool:
+    """Return the tool of an operation: with the parts that it requires."""
+    parts = [part for part in parts_of(operation) if part.is_required]
+    is_of_rover = operation.about == "rover"
 
+    async def of_rover(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
+        vehicle = await rovers.vehicle(values.pop("vehicle"))
+        await ask(await rovers.client(), operation, values, vehicle=vehicle)
+        return {"done": f"rover {vehicle}: {operation.done}"}
 
-async def _resume(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
-    vehicle = await rovers.vehicle(values["vehicle"])
-    await (await rovers.client()).resume(epoch=values["epoch"], vehicle=vehicle)
-    return {"done": f"rover {vehicle}: resumed"}
+    async def of_task(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
+        client = await rovers.client()
+        status = await rovers.status(values.pop("id"))
+        await ask(client, operation, values, vehicle=status.vehicle, task=status.id)
+        return task_form(await client.status(status.id, vehicle=status.vehicle))
+
+    return Tool(
+        operation.name,
+        operation.summary,
+        f"{operation.summary}. {operation.advice}".strip(),
+        (ROVER if is_of_rover else ID, *parts),
+        DONE if is_of_rover else TASK,
+        of_rover if is_of_rover else of_task,
+        is_destructive=not operation.is_halt,
+    )
 
 
 STOP = Tool(
     "stop",
     "STOP",
-    "Stop every rover at once, or the named one. If in doubt, call it: it needs no permission. The "
-    "running task ends; no task runs until resume, which needs the role 'operator'.",
+    f"{OPERATION['stop'].summary}. {OPERATION['stop'].advice}",
     (ROVER,),
     DONE,
     _stop,
@@ -109,42 +102,9 @@ def driving(limits: str) -> tuple[Tool, ...]:
             is_destructive=True,
             makes_a_task=True,
         ),
-        Tool(
-            "cancel",
-            "Cancel a task",
-            "Cancel a task. If it is being driven, the rover stops; the next task then starts.",
-            (ID,),
-            TASK,
-            _cancel,
-            is_destructive=True,
-        ),
-        Tool(
-            "release",
-            "Release a held task",
-            "Decide about a held task, which blocks its rover: finish it, repeat it, or drop it. "
-            "Find out first why it is held. If the queue is paused, call resume, too.",
-            (ID, HOW, EPOCH),
-            TASK,
-            _release,
-            is_destructive=True,
-        ),
-        STOP,
-        Tool(
-            "pause",
-            "Pause a rover",
-            "Stop a rover; its task and its queue continue on resume.",
-            (ROVER,),
-            DONE,
-            _pause,
-        ),
-        Tool(
-            "resume",
-            "Resume a rover",
-            "Let a rover drive its tasks again after a pause, a STOP or a takeover; needs the role "
-            "'operator'. If a person has stopped the rover, ask that person first.",
-            (ROVER, EPOCH),
-            DONE,
-            _resume,
-            is_destructive=True,
+        *(
+            STOP if each is OPERATION["stop"] else _made(each)
+            for each in OPERATIONS
+            if not each.no_tool
         ),
     )

@@ -2,6 +2,17 @@
 
 from mav_tasks.cli.lazy import LazyCommand as Lazy
 from mav_tasks.cli.program import Program
+from mav_tasks.client.operations import OPERATIONS, Operation
+
+HALTS = ("stop", "pause", "resume")
+
+
+def _made(operation: Operation) -> Lazy:
+    """Return the command of a declared operation."""
+    by_hand = "halts" if operation.name in HALTS else "control"
+    home = by_hand if "command" in operation.by_hand else "asked"
+    return Lazy(operation.name, f"{home}:{operation.name}", f"{operation.summary}.")
+
 
 COMMANDS = (
     Lazy("serve", "serve:serve", "Run the task server.", kind="serve:ServeCommand"),
@@ -11,17 +22,7 @@ COMMANDS = (
     Lazy("status", "status:status", "Show a task, and what to do if it waits for you."),
     Lazy("queue", "queue:queue", "Show the running and the waiting tasks, and why they wait."),
     Lazy("history", "history:history", "List finished tasks, newest first."),
-    Lazy("cancel", "control:cancel", "Cancel a task, by default the running one."),
-    Lazy("clear", "control:clear", "Cancel all waiting tasks of a rover."),
-    Lazy("stop", "halts:stop", "Stop the rovers at once; no task runs until you resume."),
-    Lazy(
-        "pause",
-        "halts:pause",
-        "Stop a rover, and pause its task and queue until you resume.",
-    ),
-    Lazy("resume", "halts:resume", "Resume tasks after a pause, a STOP or a takeover."),
-    Lazy("modify", "control:modify", "Change a task that has not ended."),
-    Lazy("release", "control:release", "Restart, finish or skip a held task."),
+    *map(_made, OPERATIONS),
     Lazy("vehicles", "vehicles:vehicles", "Show the rovers of the server."),
     Lazy("ready", "ready:ready", "Check that the server answers and that it hears its rovers."),
     Lazy(

@@ -49,7 +49,7 @@ async def cancel(
         ),
     ] = False,
 ) -> None:
-    """Cancel a task, by default the running one.
+    """Cancel a task.
 
     If it repeats, its next run stays planned unless you give --series (or --kill).
     """

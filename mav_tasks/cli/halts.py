@@ -57,14 +57,14 @@ async def stop(
 async def pause(common: Common, everywhere: Everywhere = False) -> None:
     """Stop a rover, and pause its task and queue until you resume."""
     async with opened(common) as client:
-        rovers = _chosen(client, common, everywhere=everywhere)
+        rovers = chosen(client, common, everywhere=everywhere)
         alone = is_alone(client, common)
 
         async def pause_one(rover: int) -> str:
             await client.pause(vehicle=rover)
             return f"paused. To resume: {resume_command(rover, is_alone=alone)}"
 
-        await _each(rovers, pause_one, common, "pause")
+        await each_of(rovers, pause_one, common, "pause")
 
 
 @command
@@ -84,7 +84,7 @@ async def resume(
     if everywhere and epoch is not None:
         raise UsageError("--epoch needs one rover: use --vehicle N instead of --all")
     async with opened(common) as client:
-        rovers = _chosen(client, common, everywhere=everywhere)
+        rovers = chosen(client, common, everywhere=everywhere)
         alone = is_alone(client, common)
 
         async def resume_one(rover: int) -> str:
@@ -100,7 +100,7 @@ async def resume(
                     return f"resumed, but blocked by {line}"
             return "resumed"
 
-        await _each(rovers, resume_one, common, "resume")
+        await each_of(rovers, resume_one, common, "resume")
 
 
 async def _ended_series(client: Client, rover: int | None) -> list[TaskStatus]:
@@ -132,7 +132,7 @@ def _require_one_choice(common: Common, *, everywhere: bool) -> None:
         raise UsageError(f"--all and --vehicle {common.vehicle}: choose one of them")
 
 
-def _chosen(client: Client, common: Common, *, everywhere: bool) -> list[int]:
+def chosen(client: Client, common: Common, *, everywhere: bool) -> list[int]:
     """Return the named rover, all rovers or the only one. Raise UsageError if ambiguous."""
     _require_one_choice(common, everywhere=everywhere)
     if common.vehicle is not None:
@@ -144,7 +144,7 @@ def _chosen(client: Client, common: Common, *, everywhere: bool) -> list[int]:
     return rovers
 
 
-async def _each(
+async def each_of(
     rovers: Sequence[int],
     ask: Callable[[int], Awaitable[str]],
     common: Common,

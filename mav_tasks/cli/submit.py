@@ -3,24 +3,23 @@
 from collections.abc import Sequence
 from inspect import Parameter, Signature
 from math import radians
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from mav_tasks.basics.errors import ClientError, SettingError
+from mav_tasks.basics.errors import ClientError
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
-from mav_tasks.cli.lazy import completing, group
+from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import AnyCommon, Common, TaskOptions
+from mav_tasks.cli.parts import parameter_of, value_of
 from mav_tasks.cli.places import parse_place
 from mav_tasks.cli.session import ChoiceHeard, is_alone, opened, read, rover_of, values_checked
-from mav_tasks.cli.times import parse_duration
 from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json
 from mav_tasks.client.wire import Goal
-from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.kinds import GoTo
 from mav_tasks.kinds.form import Form
 from mav_tasks.kinds.in_json import FORMS, GOTO, GOTO_GLOBAL, PLUGGED, made_of
@@ -36,17 +35,6 @@ Speed = Annotated[
     float | None, typer.Option(metavar="M/S", help="Speed; default: driving.speed of the server.")
 ]
 app = group("Submit a task.", epilog=EPILOG)
-
-
-#: metavars of values by their unit
-METAVARS = {
-    "m": "METRES",
-    "m/s": "M/S",
-    "deg": "DEGREES",
-    "deg/s": "DEG/S",
-    "s": "DURATION",
-}
-SECONDS = "s"
 
 
 @command
@@ -89,48 +77,17 @@ def _add(form: Form) -> None:
 
     async def submit(terms: TaskOptions, common: AnyCommon, **given: str | None) -> None:
         pairs = ((part, given[part.name]) for part in form.numbers)
-        parts = {part.name: _read(part, text) for part, text in pairs if text is not None}
+        parts = {part.name: value_of(part, text) for part, text in pairs if text is not None}
         await _submit(made_of(form, parts), terms, common)
 
     shared = [Parameter(n, Parameter.KEYWORD_ONLY, annotation=a) for n, a in SHARED.items()]
-    submit.__signature__ = Signature([*map(_parameter, form.numbers), *shared])  # type: ignore[attr-defined]
+    submit.__signature__ = Signature([*map(parameter_of, form.numbers), *shared])  # type: ignore[attr-defined]
     submit.__doc__ = form.meaning
     add = app.command(form.name.replace("_", "-"), cls=NumbersCommand, context_settings=NUMBERS)
     add(command(submit))
 
 
 SHARED = {"terms": TaskOptions, "common": AnyCommon}
-
-
-def _parameter(part: Part) -> Parameter:
-    """Return the argument or option of a part, whose value is a text."""
-    words = part.meaning[:1].upper() + part.meaning[1:]
-    words += ", for example 30s or 5m" if part.shape.unit == SECONDS else ""
-    names = getattr(part.shape, "words", ())
-    words += f": {', '.join(names)}" if names else ""
-    more: dict[str, Any] = {"metavar": _metavar(part), "help": f"{words}."}
-    if names:
-        more["autocompletion"] = completing(names)
-    if part.is_required:
-        kind, default = Annotated[str, typer.Argument(**more)], Parameter.empty
-    else:
-        option = typer.Option(f"--{part.name.replace('_', '-')}", **more)
-        kind, default = Annotated[str | None, option], None
-    return Parameter(part.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-
-
-def _metavar(part: Part) -> str:
-    return METAVARS.get(part.shape.unit, part.name.upper())
-
-
-def _read(part: Part, text: str) -> object:
-    """Return the plain value of a text; one that cannot be parsed is for the part to refuse."""
-    if part.shape.unit == SECONDS:
-        return parse_duration(_metavar(part), text)
-    try:
-        return part.shape.read(text)
-    except SettingError:
-        return text
 
 
 for each in FORMS:

@@ -234,18 +234,25 @@ class Client:
         return await self._ask.parameter(name, self._task_server(vehicle))
 
     async def cancel(
-        self, task_id: int | None = None, *, series: bool = False, vehicle: int | None = None
+        self,
+        task_id: int | None = None,
+        *,
+        series: bool = False,
+        kill: bool = False,
+        vehicle: int | None = None,
     ) -> int:
         """Cancel a task, by default the running one. Return its id. Raise Refused if none runs.
 
         If the task repeats, its next run stays planned. ``series``: cancel the present run of its
-        series, and all further ones; ``task_id`` may be that of any run.
+        series, and all further ones; ``task_id`` may be that of any run. ``kill``: put the rover
+        into HOLD at once, which ends a series, too.
         """
-        return await self._cancel(task_id, 0.0, vehicle, series=series)
+        how = KILL if kill else 0.0
+        return await self._cancel(task_id, how, vehicle, series=series and not kill)
 
     async def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
         """Cancel a task and put the rover into HOLD at once. Return the task's id."""
-        return await self._cancel(task_id, KILL, vehicle)
+        return await self.cancel(task_id, kill=True, vehicle=vehicle)
 
     async def clear(self, *, running_too: bool = False, vehicle: int | None = None) -> None:
         """Cancel all waiting tasks; ``running_too``: the running one, too."""

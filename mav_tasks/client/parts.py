@@ -2,7 +2,7 @@
 
 from mav_tasks.client.idempotency import LONGEST
 from mav_tasks.config.setting_keys.parts import Part
-from mav_tasks.config.setting_keys.shapes import Choice, Items, Number, Text
+from mav_tasks.config.setting_keys.shapes import Choice, Flag, Items, Number, Text
 from mav_tasks.kinds.in_json import goal_schema
 from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, MIN_PERIOD
@@ -52,3 +52,22 @@ EPOCH = Part(
     " since then, the request is refused (stale); read again, and think again",
     True,
 )
+
+#: of the operations of ``operations``, by their names
+OF_OPERATIONS = {
+    part.name: part
+    for part in (
+        *(PRIORITY, DELAY, AT, DEADLINE, LABEL, CRON, HOW, EPOCH),
+        Part("after", TASK_OR_NONE, "task that must complete first; 0: none"),
+        Part("before", TASK_OR_NONE, "it runs just before this task; 0: last"),
+        Part(
+            "every", Number(0, MAX_PERIOD, "s", is_whole=True), "repeat: between starts; 0: do not"
+        ),
+        Part("preemptible", Flag(), "other tasks may interrupt it"),
+        Part("preemptive", Flag(), "it may interrupt other tasks"),
+        Part("kill", Flag(), "put the rover into HOLD at once"),
+        Part("series", Flag(), "end its series, too: it does not repeat any more"),
+        Part("running_too", Flag(), "also cancel the running task"),
+        Part("clear", Flag(), "also cancel the waiting tasks"),
+    )
+}

@@ -171,14 +171,20 @@ class SyncClient(BlockingClient):
         return self._call(self._aio.parameter(name, vehicle=vehicle))
 
     def cancel(
-        self, task_id: int | None = None, *, series: bool = False, vehicle: int | None = None
+        self,
+        task_id: int | None = None,
+        *,
+        series: bool = False,
+        kill: bool = False,
+        vehicle: int | None = None,
     ) -> int:
         """Cancel a task, by default the running one. Return its id. Raise Refused if none runs.
 
         If the task repeats, its next run stays planned. ``series``: cancel the present run of its
-        series, and all further ones; ``task_id`` may be that of any run.
+        series, and all further ones; ``task_id`` may be that of any run. ``kill``: put the rover
+        into HOLD at once, which ends a series, too.
         """
-        return self._call(self._aio.cancel(task_id, series=series, vehicle=vehicle))
+        return self._call(self._aio.cancel(task_id, series=series, kill=kill, vehicle=vehicle))
 
     def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
         """Cancel a task and put the rover into HOLD at once. Return the task's id."""

@@ -1,18 +1,15 @@
 """Operations on rovers: their state, STOP, pause, resume, queue, fence and rally points."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
-from mav_tasks.basics.errors import MavTasksError, NoSuchVehicle, Refused
 from mav_tasks.client.aio import Client
 from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
-from mav_tasks.client.parts import EPOCH, VEHICLE_ID
+from mav_tasks.client.parts import VEHICLE_ID
 from mav_tasks.config.setting_keys.parts import Part, schema_of
 from mav_tasks.config.setting_keys.shapes import LARGEST, Flag, Items, Number, Record
 from mav_tasks.kinds.goto import ON_EARTH
 from mav_tasks.plans import PlanFile
-from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.plan_text import NAME, text_part
@@ -37,14 +34,7 @@ RALLY = [NAME, text_part("contents of a .plan file with rally points")]
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
     client, live, asks = services.client, services.live, services.asks
-    pauses = Flights()
-
-    def known(call: Call) -> int:
-        """Return the rover; raise NoSuchVehicle if the server does not have it."""
-        if not client.some_vehicles({call.vehicle}):
-            ids = ", ".join(str(each.id) for each in client.vehicles()) or "none"
-            raise NoSuchVehicle(f"no rover {call.vehicle}; the server has: {ids}")
-        return call.vehicle
+    known = services.rover_of
 
     async def vehicles(_call: Call) -> object:
         return {"vehicles": live.vehicle_forms()}
@@ -59,37 +49,7 @@ def operations(services: Services) -> list[Operation]:
         async def send(line: Line) -> Stop:
             return await live.stops.stop(rover, clear=clear, by=call.identity.name, line=line)
 
-        return (await halted(call, send)).form()
-
-    async def pause(call: Call) -> None:
-        rover = known(call)
-
-        async def send(line: Line) -> None:
-            await pauses.join((rover, line.name), lambda: line.client.pause(vehicle=rover))
-
-        await halted(call, send)
-        await live.refresh(rover)
-
-    async def halted(call: Call, send: Callable[[Line], Awaitable[T]]) -> T:
-        """Halt by the user's connection if it is up; without an answer, by that of the process."""
-        *others, last = services.users.ways_to_halt(call.identity)
-        for line in others:
-            try:
-                return await send(line)
-            except Refused:
-                raise
-            except MavTasksError:  # the next one goes at once
-                continue
-        return await send(last)
-
-    async def resume(call: Call, client: Client) -> None:
-        await client.resume(epoch=call.body["epoch"], vehicle=known(call))
-        await live.refresh(call.vehicle)
-
-    async def clear(call: Call, client: Client) -> None:
-        running_too = bool(call.body["running_too"])
-        await client.clear(running_too=running_too, vehicle=known(call))
-        await live.refresh(call.vehicle)
+        return (await services.halted(call, send)).form()
 
     async def queue(call: Call) -> object:
         limit = call.query["limit"]
@@ -149,21 +109,6 @@ def operations(services: Services) -> list[Operation]:
                 Part("clear", Flag(), "also cancel the waiting tasks"),
             ],
             answer="Stop",
-        ),
-        Operation("POST", f"{one}/pause", "Pause a rover and its queue", pause, body=[]),
-        Operation(
-            "POST",
-            f"{one}/resume",
-            "Resume after a pause, a STOP or a takeover",
-            asks(resume),
-            body=[EPOCH],
-        ),
-        Operation(
-            "POST",
-            f"{one}/clear",
-            "Cancel the waiting tasks",
-            asks(clear),
-            body=[Part("running_too", Flag(), "also cancel the running task")],
         ),
         Operation("GET", f"{one}/queue", "The queue", queue, query=[LIMIT], answer="Queue"),
         Operation(

@@ -4,56 +4,29 @@ from typing import Any
 
 from starlette.responses import Response
 
-from mav_tasks.basics.errors import NoSuchVehicle
 from mav_tasks.client.aio import Client
 from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.parts import (
-    AT,
-    CRON,
-    DEADLINE,
-    DELAY,
-    EPOCH,
     GOALS,
-    HOW,
     KEY_TEXT,
-    LABEL,
-    PRIORITY,
-    TASK_OR_NONE,
 )
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.terms import AnyRover
-from mav_tasks.client.values import TaskStatus
 from mav_tasks.config.setting_keys.parts import Part
-from mav_tasks.config.setting_keys.shapes import Flag, Number
 from mav_tasks.kinds.in_json import goals_of
-from mav_tasks.tasks.repetition import MAX_PERIOD
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.plan_text import NAME, text_part
 from mav_tasks.web.services import Services
-from mav_tasks.web.submissions import KEY, TERMS, moment_of, repeat_of, submit
+from mav_tasks.web.submissions import KEY, TERMS, submit
 
 FILE = (NAME, text_part("contents of a .plan or QGC WPL 110 file"))
 KEYED = (Part(KEY, KEY_TEXT, "a text of yours: the same key makes no second task"),)
-CHANGES = (
-    PRIORITY,
-    Part("after", TASK_OR_NONE, "task that must complete first; 0: none"),
-    Part("before", TASK_OR_NONE, "it runs just before this task; 0: last"),
-    DELAY,
-    AT,
-    DEADLINE,
-    LABEL,
-    Part("every", Number(0, MAX_PERIOD, "s", is_whole=True), "repeat: between starts; 0: do not"),
-    CRON,
-    Part("preemptible", Flag(), "other tasks may interrupt it"),
-    Part("preemptive", Flag(), "it may interrupt other tasks"),
-)
 #: what the path names as the rover, and what it means for a new task
 RUNS_ON = {
     "any": " of the rover that would begin it first; it may get another rover before it begins",
     "{vehicle}": "; answered once the task is durable",
 }
-RELEASE = (HOW, EPOCH)
 
 
 def _named_by(call: Call) -> int | AnyRover:
@@ -92,48 +65,17 @@ def operations(services: Services) -> list[Operation]:
     async def preview(call: Call) -> Any:
         return Response(call.body["answer"], media_type="application/json")
 
-    async def status_of(call: Call) -> TaskStatus:
-        """Return a task's status. The server of any rover knows the tasks of all rovers."""
-        rovers = client.vehicles()
-        if not rovers:
-            raise NoSuchVehicle("the server has no rover")
-        return await client.status(call.task, vehicle=rovers[0].id)
-
     async def task(call: Call) -> Any:
-        status = await status_of(call)
+        status = await services.status_of(call)
         await services.look_up_user(status.id)
         return live.task_form(status, is_whole=True)
 
     async def timing(call: Call) -> Any:
-        status = await status_of(call)
+        status = await services.status_of(call)
         return timing_json(await client.timing(status.id, vehicle=status.vehicle))
 
     async def track(call: Call) -> Any:
         return {"points": live.tracks.of_task(call.task)}
-
-    async def modify(call: Call, by: Client) -> Any:
-        status = await status_of(call)
-        repeat, at = repeat_of(call.body), moment_of(call.body["at"])
-        changes = {**call.body, "at": at, "every": repeat}
-        del changes["cron"]
-        await by.modify(status.id, vehicle=status.vehicle, **changes)
-        live.hurry(status.vehicle)
-        return live.task_form(await client.status(status.id, vehicle=status.vehicle))
-
-    async def cancel(call: Call, by: Client) -> None:
-        status = await status_of(call)
-        if call.body["kill"]:
-            await by.kill(status.id, vehicle=status.vehicle)
-        else:
-            series = bool(call.body["series"])
-            await by.cancel(status.id, series=series, vehicle=status.vehicle)
-        live.hurry(status.vehicle)
-
-    async def release(call: Call, by: Client) -> None:
-        epoch, how = call.body["epoch"], call.body["how"]
-        status = await status_of(call)
-        await by.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
-        live.hurry(status.vehicle)
 
     async def journal(call: Call) -> Any:
         return {"entries": await services.entries(task=call.task, limit=1000)}
@@ -184,16 +126,4 @@ def operations(services: Services) -> list[Operation]:
             answer="Track",
         ),
         Operation("GET", f"{one}/journal", "What happened to a task", journal, answer="Entries"),
-        Operation("PATCH", one, "Change a task", asks(modify), body=CHANGES, answer="Task"),
-        Operation(
-            "POST",
-            f"{one}/cancel",
-            "Cancel a task",
-            asks(cancel),
-            body=[
-                Part("kill", Flag(), "put the rover into HOLD at once"),
-                Part("series", Flag(), "end its series, too: it does not repeat any more"),
-            ],
-        ),
-        Operation("POST", f"{one}/release", "Release a held task", asks(release), body=RELEASE),
     ]

@@ -11,7 +11,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from mav_tasks.metrics.exposition import CONTENT_TYPE
-from mav_tasks.web import api_past, api_rovers, api_session, api_tasks, pages
+from mav_tasks.web import api_asked, api_past, api_rovers, api_session, api_tasks, pages
 from mav_tasks.web.figures import Figures
 from mav_tasks.web.guard import Guard
 from mav_tasks.web.openapi import document_of
@@ -22,7 +22,7 @@ from mav_tasks.web.services import Services
 
 def operations_of(services: Services) -> list[Operation]:
     """Return all operations of the API."""
-    parts = (api_session, api_rovers, api_tasks, api_past)
+    parts = (api_session, api_rovers, api_tasks, api_asked, api_past)
     return [operation for part in parts for operation in part.operations(services)]
 
 

@@ -4,10 +4,11 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
-from mav_tasks.basics.errors import StoreError
+from mav_tasks.basics.errors import MavTasksError, NoSuchVehicle, Refused, StoreError
 from mav_tasks.client.aio import Client
+from mav_tasks.client.values import TaskStatus
 from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.goal import Plan
@@ -19,7 +20,9 @@ from mav_tasks.web.problems import Problem, not_found
 from mav_tasks.web.records import Records
 from mav_tasks.web.sessions import Sessions
 from mav_tasks.web.tiles import Tiles
-from mav_tasks.web.users import Users
+from mav_tasks.web.users import Line, Users
+
+T = TypeVar("T")
 
 
 @dataclass(slots=True)
@@ -81,6 +84,32 @@ class Services:
             return await handler(call, line.client)
 
         return run
+
+    def rover_of(self, call: Call) -> int:
+        """Return the rover of a request; raise NoSuchVehicle if the server does not have it."""
+        if not self.client.some_vehicles({call.vehicle}):
+            ids = ", ".join(str(each.id) for each in self.client.vehicles()) or "none"
+            raise NoSuchVehicle(f"no rover {call.vehicle}; the server has: {ids}")
+        return call.vehicle
+
+    async def status_of(self, call: Call) -> TaskStatus:
+        """Return the status of a request's task. The server of any rover knows those of all."""
+        rovers = self.client.vehicles()
+        if not rovers:
+            raise NoSuchVehicle("the server has no rover")
+        return await self.client.status(call.task, vehicle=rovers[0].id)
+
+    async def halted(self, call: Call, send: Callable[[Line], Awaitable[T]]) -> T:
+        """Halt by the user's connection if it is up; without an answer, by that of the process."""
+        *others, last = self.users.ways_to_halt(call.identity)
+        for line in others:
+            try:
+                return await send(line)
+            except Refused:
+                raise
+            except MavTasksError:  # the next one goes at once
+                continue
+        return await send(last)
 
     async def entries(
         self, *, task: int | None, vehicle: int | None = None, after: int | None = None, limit: int

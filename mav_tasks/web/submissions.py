@@ -5,11 +5,11 @@ same key.
 """
 
 from collections.abc import Mapping
-from datetime import datetime
 from typing import Any
 
 from mav_tasks.basics.errors import Refused
 from mav_tasks.client.aio import Client
+from mav_tasks.client.asking import moment_of, repeat_of
 from mav_tasks.client.handle import Task
 from mav_tasks.client.idempotency import LONGEST, numbers_of
 from mav_tasks.client.parts import AFTER, AT, CRON, DEADLINE, DELAY, EVERY, LABEL, PRIORITY
@@ -21,27 +21,6 @@ from mav_tasks.web.problems import Problem, invalid
 
 KEY = "idempotency-key"
 TERMS = (PRIORITY, AFTER, DELAY, AT, DEADLINE, LABEL, EVERY, CRON)
-
-
-def moment_of(text: str | None) -> datetime | None:
-    """Return a time with its zone. Raise Problem if it is invalid."""
-    if text is None:
-        return None
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        raise invalid(f"at {text!r}: expected a time such as 2026-11-20T14:30:00Z") from None
-    if moment.tzinfo is None:
-        raise invalid(f"at {text!r}: expected a time zone, such as Z or +01:00")
-    return moment
-
-
-def repeat_of(terms: Mapping[str, Any]) -> int | str | None:
-    """Return when a task repeats, None if nothing is said. Raise Problem if it is said twice."""
-    if terms["every"] is not None and terms["cron"]:
-        raise invalid("every and cron: choose one of them")
-    repeat: int | str | None = terms["cron"] or terms["every"]
-    return repeat
 
 
 async def submit(

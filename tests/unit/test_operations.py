@@ -1,0 +1,105 @@
+"""An operation is declared once, in ``client/operations.py``: all surfaces have it, or a reason."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from unittest.mock import MagicMock
+
+from mav_tasks.agents.driving import driving
+from mav_tasks.cli.commands import COMMANDS
+from mav_tasks.client.operations import OPERATIONS
+from mav_tasks.client.parts import OF_OPERATIONS
+from mav_tasks.web.application import operations_of
+from mav_tasks.web.openapi import document_of
+
+ROOT = Path(__file__).resolve().parents[2]
+ROUTES = {"rover": "/vehicles/{vehicle}/", "task": "/tasks/{task}/", "all": "/"}
+WITHOUT = {"modify"}  # a path of its own: it is the PATCH of a task
+
+ROW = """OPERATIONS = (
+    Operation("honk", "rover", "Sound the horn", "priority kill", "Ask first.", done="honked"),
+"""
+METHOD = """    async def honk(
+        self, *, priority: int = 5, kill: bool = False, vehicle: int | None = None
+    ) -> None:
+        await self._control(vehicle, MavCmd.DO_SET_RELAY, float(priority), float(kill))
+
+    async def pause("""
+SCRIPT = """
+from unittest.mock import MagicMock
+from mav_tasks import __file__ as where
+from mav_tasks.agents.driving import driving
+from mav_tasks.cli.app import app
+from mav_tasks.client.sync import SyncClient
+from mav_tasks.web.application import operations_of
+from mav_tasks.web.openapi import document_of
+
+assert where.startswith({copy!r}), where
+body = document_of(operations_of(MagicMock()))["paths"]["/vehicles/{{vehicle}}/honk"]["post"]
+schema = body["requestBody"]["content"]["application/json"]["schema"]
+assert schema["properties"]["priority"]["maximum"] == 10, schema
+(tool,) = (each for each in driving("") if each.name == "honk")
+assert (tool.title, tool.about) == ("Sound the horn", "Sound the horn. Ask first.")
+assert SyncClient.honk
+for arguments in (["--help"], ["honk", "--help"], ["honk", "--priority", "11"]):
+    try:
+        app(arguments, prog_name="mav-tasks")
+    except SystemExit:
+        pass
+    except Exception as error:
+        print(error)
+"""
+
+
+def test_each_surface_has_each_operation_or_a_reason() -> None:
+    paths = document_of(operations_of(MagicMock()))["paths"]
+    tools = {tool.name: tool for tool in driving("")}
+    commands = {each.name: each for each in COMMANDS}
+    for each in OPERATIONS:
+        route = ROUTES[each.about] + each.name
+        verbs = paths[route.removesuffix("/modify") if each.name in WITHOUT else route]
+        body = verbs["patch" if each.name in WITHOUT else "post"]["requestBody"]
+        properties = body["content"]["application/json"]["schema"]["properties"]
+        assert properties.keys() - {"vehicle"} == set(each.names), each.name
+        assert commands[each.name].help == f"{each.summary}."
+        if each.no_tool:
+            assert each.name not in tools
+            continue
+        required = {name for name in each.names if OF_OPERATIONS[name].is_required}
+        arguments = {part.name: part.schema for part in tools[each.name].arguments}
+        assert arguments.keys() - {"vehicle", "id"} == required
+        assert {name: arguments[name] for name in required} == {
+            name: properties[name] for name in required
+        }
+
+
+def test_a_new_operation_is_one_row_and_the_method_that_does_it(tmp_path: Path) -> None:
+    copy = tmp_path / "mav_tasks"
+    for name in ("mav_tasks", "tools"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name, before, after in (
+        ("operations.py", "OPERATIONS = (\n", ROW),
+        ("aio.py", "    async def pause(", METHOD),
+    ):
+        path = copy / "client" / name
+        text = path.read_text(encoding="utf-8")
+        assert text.count(before) == 1
+        path.write_text(text.replace(before, after), encoding="utf-8")
+    environment = {"PYTHONPATH": str(tmp_path), "PATH": str(Path(sys.executable).parent)}
+    said = ""
+    for arguments in (("tools/sync_client.py",), ("-c", SCRIPT.format(copy=str(copy)))):
+        ran = subprocess.run(
+            [sys.executable, *arguments],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert ran.returncode == 0, ran.stderr
+        said = " ".join(ran.stdout.split())
+    assert "honk Sound the horn." in said
+    assert "--priority PRIORITY 10 runs first; 5 if not given. --kill" in said
+    assert "priority 11: not in 0..10" in said
