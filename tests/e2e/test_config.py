@@ -12,6 +12,7 @@ from pathlib import Path
 from mav_tasks.store import open_store
 from mav_tasks.tasks.events import ParameterSet
 from tests.e2e.test_usage import run
+from tests.kit.commands import Done, mav_tasks
 from tests.kit.processes import (
     Process,
     environment_with,
@@ -57,7 +58,7 @@ def test_sighup_changes_what_can_change_while_a_rover_drives(tmp_path: Path) -> 
         it.server.wait_for("ERROR configuration: not applied")
         client.mav.param_set_send(1, 191, b"TSK_SPEED", 0.9, 9)
         it.server.wait_for("TSK_SPEED")
-        shown = run("config", "show", "driving.speed", environment={"MAV_TASKS_STORE": str(store)})
+        shown = run("config", "show", "driving.speed", store=str(store))
         assert shown == (0, "driving.speed = 0.9  # m/s, TSK_SPEED, set by a client\n", ignored)
         it.server.end()
     assert it.server.popen.returncode == 0
@@ -113,12 +114,4 @@ def test_the_sample_can_be_checked_and_what_is_in_force_too_in_a_pipe(tmp_path: 
     for command in (("config", "init"), ("config", "show")):
         code, printed, error = run(*command)
         assert (code, error) == (0, "")
-        piped = subprocess.run(
-            [sys.executable, "-m", "mav_tasks.cli", "config", "check", "-"],
-            input=printed,
-            capture_output=True,
-            text=True,
-            timeout=30,
-            check=False,
-        )
-        assert (piped.returncode, piped.stdout, piped.stderr) == (0, "ok\n", "")
+        assert mav_tasks("config", "check", "-", given=printed) == Done(0, "ok\n", "")

@@ -4,7 +4,6 @@ import io
 import re
 import socket
 import stat
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -14,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from mav_tasks import Key, Move, NoAnswer, SyncClient
-from tests.kit.commands import LIMIT, Done, called, surroundings
+from tests.kit.commands import Done, called, mav_tasks
 from tests.kit.processes import Stand, stand, wait_until
 from tests.kit.terminal import Terminal, terminal
 from tests.kit.web import key_in
@@ -26,16 +25,7 @@ COUNTED_BY_NOBODY = "no task server answered"
 
 def keys(*arguments: str, ring: Path, given: str = "") -> Done:
     """Run ``mav-tasks keys``; ``given`` is its standard input, a pipe."""
-    done = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "keys", *arguments, "--keys", str(ring)],
-        input=given,
-        capture_output=True,
-        text=True,
-        timeout=LIMIT,
-        env=surroundings("", MAV_TASKS_CONFIG=""),
-        check=False,
-    )
-    return Done(done.returncode, done.stdout, done.stderr)
+    return mav_tasks("keys", *arguments, "--keys", str(ring), given=given, MAV_TASKS_CONFIG="")
 
 
 @pytest.fixture

@@ -9,11 +9,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.kit.commands import mav_tasks
 from tests.kit.processes import (
     Process,
     Stand,
@@ -95,14 +97,7 @@ def test_a_server_whose_log_nobody_reads_goes_on_driving_and_ends(tmp_path: Path
 
 def export(*options: str) -> tuple[int, str, str]:
     """Run ``mav-tasks log``; gives exit code, standard output and error."""
-    done = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "log", *options],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-    )
-    return done.returncode, done.stdout, done.stderr
+    return astuple(mav_tasks("log", *options))
 
 
 def test_the_log_in_json_and_the_journal_beside_the_server_say_the_same(tmp_path: Path) -> None:

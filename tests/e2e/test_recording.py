@@ -3,8 +3,6 @@
 import os
 import resource
 import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, closing, contextmanager
 from itertools import pairwise
@@ -20,6 +18,7 @@ from pymavlink import mavutil
 
 from mav_tasks.recording.reading import read
 from tests.kit.bridges import Bridge, TcpFar, bridge
+from tests.kit.commands import mav_tasks
 from tests.kit.processes import Stand, after_a_restart, stand, submit, wait_for, wait_until
 
 PERIOD = 0.05  # s, between setpoints
@@ -98,15 +97,8 @@ def test_a_full_disk_holds_up_neither_the_task_nor_the_setpoints(tmp_path: Path)
 
 def replayed(record: Path) -> tuple[int, str]:
     """The exit code of a replay with other hashes, and what it prints."""
-    done = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "replay", str(record)],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-        env={**os.environ, "PYTHONHASHSEED": "12345"},
-    )
-    return done.returncode, done.stdout + done.stderr
+    done = mav_tasks("replay", str(record), PYTHONHASHSEED="12345")
+    return done.status, done.output + done.error
 
 
 def submissions_in(record: Path) -> int:

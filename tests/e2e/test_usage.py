@@ -4,25 +4,18 @@ import re
 import socket
 import subprocess
 import sys
+from dataclasses import astuple
 from pathlib import Path
 
 import pytest
 
-from tests.kit.commands import called
-from tests.kit.processes import environment_with, free_tcp_ports, free_udp_ports, process
+from tests.kit.commands import called, mav_tasks
+from tests.kit.processes import free_tcp_ports, free_udp_ports, process
 
 
-def run(*arguments: str, environment: dict[str, str] | None = None) -> tuple[int, str, str]:
+def run(*arguments: str, store: str = ":memory:") -> tuple[int, str, str]:
     """Run ``mav-tasks`` to its end; gives exit code, standard output and error."""
-    done = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        env=environment_with(**{"MAV_TASKS_STORE": ":memory:", **(environment or {})}),
-        check=False,
-    )
-    return done.returncode, done.stdout, done.stderr
+    return astuple(mav_tasks(*arguments, MAV_TASKS_STORE=store, MAV_TASKS_CONFIG=""))
 
 
 def assert_one_clear_line(result: tuple[int, str, str], *words: str) -> None:
@@ -167,7 +160,7 @@ def test_the_doctor_says_what_is_wrong_and_what_helps(tmp_path: Path) -> None:
         code, said, error = run(
             *("doctor", "--server", f"udpout:127.0.0.1:{port}", "--timeout", "0.3"),
             *("--config", str(configuration)),
-            environment={"MAV_TASKS_STORE": str(store)},
+            store=str(store),
         )
     assert (code, error) == (1, "")
     wrong = {line.split()[1]: line for line in said.splitlines() if line.startswith("WRONG")}

@@ -75,17 +75,20 @@ def session(server: str, text: str) -> None:
 
 
 def mav_tasks(
-    *arguments: str, server: str = "", folder: Path | None = None, **environment: str
+    *arguments: str, server: str = "", folder: Path | None = None, given: str = "", **more: str
 ) -> Done:
-    """Run a command with pipes; ``server``: its URL, ``folder``: the working directory."""
+    """Run a command with pipes; ``given`` is its standard input, ``more`` of its environment.
+
+    ``server``: its URL, ``folder``: the working directory.
+    """
     done = subprocess.run(
         [sys.executable, "-m", "mav_tasks.cli", *arguments],
         capture_output=True,
-        stdin=subprocess.DEVNULL,
+        input=given,
         text=True,
         timeout=LIMIT,
         cwd=folder,
-        env=surroundings(server, **environment),
+        env=surroundings(server, **more),
         check=False,
     )
     return Done(done.returncode, done.stdout, done.stderr)

@@ -1,8 +1,5 @@
 """A recorded world is replayed in another process, with other hashes: every event is the same."""
 
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from json import loads
 from pathlib import Path
@@ -16,6 +13,7 @@ from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import rc_override
+from tests.kit.commands import Done, mav_tasks
 from tests.kit.mission import Item
 from tests.kit.restarts import UTC, restart
 from tests.kit.store import LateStore, PromptSqliteStore
@@ -118,15 +116,8 @@ WORLDS: dict[str, Callable[[MakeWorld, Path], World]] = {
 }
 
 
-def replayed(path: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "replay", str(path), *options],
-        capture_output=True,
-        text=True,
-        timeout=50,
-        check=False,
-        env={**os.environ, "PYTHONHASHSEED": HASHES},
-    )
+def replayed(path: Path, *options: str) -> Done:
+    return mav_tasks("replay", str(path), *options, PYTHONHASHSEED=HASHES)
 
 
 @for_each("kind", WORLDS)
@@ -137,8 +128,8 @@ def test_a_recorded_world_decides_the_same_again(
     told = [str(event) for event in world.server.store.events]  # type: ignore[attr-defined]
     for path in world.end_records():
         done = replayed(path, "--json")
-        *events, verdict = map(loads, done.stdout.splitlines())
-        assert (done.returncode, verdict["verdict"], done.stderr) == (0, "same", "")
+        *events, verdict = map(loads, done.output.splitlines())
+        assert (done.status, verdict["verdict"], done.error) == (0, "same", "")
         assert verdict["why_it_ends"] == "the run is over"
         assert verdict["events"] == len(events) > 0
     assert [event["message"] for event in events] == told
