@@ -43,6 +43,13 @@ def times_told(world: World) -> int:
     return world.observer.sent_since(0).count(str(RELAY))
 
 
+def told_without_an_answer(world: World, faults: Faults = UNANSWERED) -> int:
+    world.fault(faults)
+    task = upload(world, TOLD)
+    world.until(lambda: times_told(world) == 1, within=10.0)
+    return task
+
+
 def test_it_is_told_once_between_two_drives_while_the_rover_stands(world: World) -> None:
     seen: list[Any] = []
 
@@ -88,9 +95,7 @@ def test_it_fails_with_the_rovers_own_result(
 
 @for_each("how", [AGAIN, REMAINDER, SKIP])
 def test_after_a_crash_it_is_not_told_again_but_held(world: World, path: Path, how: int) -> None:
-    world.fault(UNANSWERED)
-    task = upload(world, TOLD)
-    world.until(lambda: times_told(world) == 1, within=10.0)
+    task = told_without_an_answer(world)
     restart(world, path)
     world.fault(NO_FAULTS)
     world.run(5.0)
@@ -106,9 +111,7 @@ def test_after_a_crash_it_is_not_told_again_but_held(world: World, path: Path, h
 
 @for_each("answers", [True, False])
 def test_a_pause_before_its_answer_keeps_what_is_known(world: World, *, answers: bool) -> None:
-    world.fault(NO_FAULTS if answers else UNANSWERED)
-    task = upload(world, TOLD)
-    world.until(lambda: times_told(world) == 1, within=10.0)
+    task = told_without_an_answer(world, NO_FAULTS if answers else UNANSWERED)
     world.client.pause()
     world.run(8.0)
     world.fault(NO_FAULTS)
@@ -121,9 +124,7 @@ def test_a_pause_before_its_answer_keeps_what_is_known(world: World, *, answers:
 
 def test_the_answer_counts_also_if_another_task_goes_first_meanwhile(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(queueing=Queueing(preemption_gap=2)))
-    world.fault(UNANSWERED)
-    task = upload(world, TOLD)
-    world.until(lambda: times_told(world) == 1, within=10.0)
+    task = told_without_an_answer(world)
     other = upload(world, "NAV_WAYPOINT at=1,0; TASK_OPTIONS 10 frame=2")
     world.until_state(other, S.EXECUTING)
     late = common.MAVLink_command_ack_message(RELAY, 0, 0, 0, 0, 0)
@@ -155,9 +156,7 @@ def test_what_comes_before_it_in_a_plan_is_done_before_it(world: World) -> None:
 
 
 def test_a_stop_ends_it(world: World) -> None:
-    world.fault(UNANSWERED)
-    task = upload(world, TOLD)
-    world.until(lambda: times_told(world) == 1, within=10.0)
+    task = told_without_an_answer(world)
     world.client.command(54003)
     world.run(8.0)
     assert world.state(task) == (S.KILLED, R.STOP)

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -72,6 +73,15 @@ def form(name: str = "mine", *parts: str) -> Form:
     return Form(name, "Mine", "Mine.", numbers, lambda: Move(1.0))
 
 
+def with_module(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Any:
+    """Install an entry point, and return the module that it names, still without its FORM."""
+    install(folder, mine="test_plugged_kind:FORM")
+    monkeypatch.syspath_prepend(str(folder))
+    module = type(sys)("test_plugged_kind")
+    monkeypatch.setitem(sys.modules, "test_plugged_kind", module)
+    return module
+
+
 @pytest.mark.parametrize(
     ("broken", "words"),
     [
@@ -88,27 +98,19 @@ def form(name: str = "mine", *parts: str) -> Form:
 def test_what_is_wrong_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, broken: Form, words: str
 ) -> None:
-    install(tmp_path, mine="test_plugged_kind:FORM")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    module = type(sys)("test_plugged_kind")
-    monkeypatch.setattr(module, "FORM", broken, raising=False)
-    monkeypatch.setitem(sys.modules, "test_plugged_kind", module)
+    with_module(monkeypatch, tmp_path).FORM = broken
     found = plugged([each.name for each in OWN])
     assert found.forms == ()
     assert found.broken.endswith(words)
 
 
 def test_what_makes_no_goals_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    install(tmp_path, mine="test_plugged_kind:FORM")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    module = type(sys)("test_plugged_kind")
-    monkeypatch.setitem(sys.modules, "test_plugged_kind", module)
+    module = with_module(monkeypatch, tmp_path)
     for made, words in (((), "made no goals"), (None, "made no goals, but None")):
-        each = Form("mine", "Mine", "Mine.", (), lambda made=made: made)
-        monkeypatch.setattr(module, "FORM", each, raising=False)
+        module.FORM = Form("mine", "Mine", "Mine.", (), lambda made=made: made)
         (kind,) = plugged([]).forms
         with pytest.raises(SettingError, match=words):
             kind.make()
     goals = (Face(0.0), Act(181))
-    monkeypatch.setattr(module, "FORM", Form("mine", "Mine", "Mine.", (), lambda: goals))
+    module.FORM = Form("mine", "Mine", "Mine.", (), lambda: goals)
     assert plugged([]).forms[0].make() == goals
