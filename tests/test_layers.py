@@ -19,7 +19,7 @@ plans: basics mavlink
 kinds: basics mavlink config
 tasks: basics config kinds
 engine: basics mavlink config kinds tasks
-store: basics config kinds tasks
+store: basics config kinds tasks engine
 fleet: basics links engine store
 recording: basics mavlink config tasks engine store
 metrics: basics mavlink links tasks engine

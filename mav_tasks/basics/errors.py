@@ -31,7 +31,7 @@ class InsecureLinkError(UsageError):
 class StoreError(UsageError):
     """A store that cannot be opened, or whose contents cannot be read.
 
-    Only raised at start: a later disk failure is an outcome (``NotKept``), not an exception.
+    Only raised at start: a later disk failure is an outcome (``StoreFailed``), not an exception.
     """
 
 

@@ -119,6 +119,7 @@ class HaltNotStored:
     """The halt of a vehicle is not durable yet: a restart of the server would lose it."""
 
     vehicle: int
+    text: str = ""
 
 
 @dataclass(frozen=True, slots=True)

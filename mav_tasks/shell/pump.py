@@ -8,23 +8,10 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from mav_tasks.engine import inputs
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Committed, HaltNotStored, Input, Outgoing, StoreFailed
 from mav_tasks.recording.observer import EngineObserver, EngineObservers
-from mav_tasks.store import (
-    Evicted,
-    HaltNotKept,
-    HaltsKept,
-    IdsGranted,
-    Kept,
-    NonceTaken,
-    NotKept,
-    Outcome,
-    Store,
-    TaskStates,
-    VehiclesLoaded,
-)
+from mav_tasks.store import Evicted, Outcome, Store
 from mav_tasks.store.rendering import level_of
 from mav_tasks.tasks.events import Event, ServerStopped
 
@@ -102,28 +89,15 @@ class Pump:
                 log.error("%s", text)
                 self.is_evicted = True
                 return None
-            case IdsGranted(first=first, count=count):
-                return inputs.IdsGranted(first, count)
-            case NonceTaken(task_id=task_id, known=known, payload=payload):
-                return inputs.NonceTaken(task_id, known, payload)
-            case VehiclesLoaded(vehicles=vehicles, restored=restored):
-                return inputs.VehiclesTaken(vehicles, restored)
-            case TaskStates(states=states):
-                return inputs.TasksElsewhere(states)
-            case HaltsKept(through=through):
-                return inputs.HaltsKept(through)
-            case HaltNotKept(vehicle=vehicle, text=text):
+            case HaltNotStored(text=text):
                 log.error("%s", text)
-                return HaltNotStored(vehicle)
-            case NotKept(text=text):
+            case StoreFailed(text=text):
                 log.error("%s: new tasks are refused until the store works", text)
                 self._store_is_away = True
-                return StoreFailed(text)
-            case Kept(through=through):
-                if self._store_is_away:
-                    log.warning("the store works again")
+            case Committed() if self._store_is_away:
+                log.warning("the store works again")
                 self._store_is_away = False
-                return Committed(through)
+        return outcome
 
     def _note(self, events: list[Event]) -> None:
         for event in events:

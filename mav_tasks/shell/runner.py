@@ -22,6 +22,7 @@ from mav_tasks.engine.inputs import (
     FLEET_LINK,
     AtOnce,
     Congestion,
+    HaltNotStored,
     Input,
     KeysChanged,
     LinkChanged,
@@ -30,6 +31,7 @@ from mav_tasks.engine.inputs import (
     PeerChanged,
     SettingsChanged,
     Shutdown,
+    StoreFailed,
     WallClock,
 )
 from mav_tasks.engine.snapshot import Reach
@@ -48,7 +50,7 @@ from mav_tasks.mavlink.stream import has_packet
 from mav_tasks.recording.observer import EngineObserver
 from mav_tasks.shell.link_reader import DRAIN, LinkReader
 from mav_tasks.shell.pump import Pump
-from mav_tasks.store import Evicted, HaltNotKept, NotKept, Store
+from mav_tasks.store import Evicted, Store
 
 log = logging.getLogger("mav_tasks")
 
@@ -335,7 +337,7 @@ class Runner:
         """Close the store; log its last outcomes, as the engine no longer takes them."""
         self._store.close()
         for outcome in self._store.take_outcomes():
-            if isinstance(outcome, NotKept | HaltNotKept | Evicted):
+            if isinstance(outcome, StoreFailed | HaltNotStored | Evicted):
                 log.error("%s", outcome.text)
 
     def _on_signal(self) -> None:

@@ -7,73 +7,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from mav_tasks.engine.inputs import (
+    Committed,
+    HaltNotStored,
+    HaltsKept,
+    IdsGranted,
+    NonceTaken,
+    StoreFailed,
+    TasksElsewhere,
+    VehiclesTaken,
+)
 from mav_tasks.tasks.events import Event
-from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.restored import Restored
-
-
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """All events up to and with this number are durable."""
-
-    through: int
-
-
-@dataclass(frozen=True, slots=True)
-class HaltsKept:
-    """A crash now would lose no halt up to this number, though perhaps other events."""
-
-    through: int
-
-
-@dataclass(frozen=True, slots=True)
-class NotKept:
-    """Events could not be made durable; the store keeps trying. ``text`` tells the reason."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class HaltNotKept:
-    """A halt of a vehicle is not stored anywhere yet; a restart would lose it."""
-
-    vehicle: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class IdsGranted:
-    """``count`` task ids from ``first`` on are this gateway's."""
-
-    first: int
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
-class VehiclesLoaded:
-    """Everything that a fleet's store has about vehicles that this gateway has got."""
-
-    vehicles: tuple[int, ...]
-    restored: Restored
-
-
-@dataclass(frozen=True, slots=True)
-class TaskStates:
-    """How tasks stand that another gateway may change; None: there is no such task."""
-
-    states: tuple[tuple[int, TaskState | None], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class NonceTaken:
-    """A submission to any vehicle was not stored: the fleet has task ``known`` with its nonce.
-
-    ``payload`` is that task's. It comes before the Kept of the submission.
-    """
-
-    task_id: int
-    known: int
-    payload: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +28,16 @@ class Evicted:
     text: str
 
 
+#: what a store tells; all but the last are inputs of the engine
 Outcome = (
-    Kept
+    Committed
     | HaltsKept
-    | NotKept
-    | HaltNotKept
+    | StoreFailed
+    | HaltNotStored
     | IdsGranted
     | NonceTaken
-    | VehiclesLoaded
-    | TaskStates
+    | VehiclesTaken
+    | TasksElsewhere
     | Evicted
 )
 

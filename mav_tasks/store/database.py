@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from mav_tasks.basics.errors import StoreError
+from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.store import schema
-from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_batch
 from mav_tasks.store.failures import failure

@@ -7,8 +7,9 @@ from mav_tasks.basics.clock import boot_time
 from mav_tasks.basics.errors import StoreError
 from mav_tasks.basics.mailbox import Mailbox
 from mav_tasks.config.settings import Retention
+from mav_tasks.engine.inputs import Committed, HaltsKept
 from mav_tasks.store import reading
-from mav_tasks.store.base import HaltsKept, Kept, Outcome, Which
+from mav_tasks.store.base import Outcome, Which
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
@@ -26,7 +27,7 @@ TRIM_AT_OPEN = 0.5  # s of deleting expired rows at start; the rest is done whil
 
 
 def _is_included(earlier: Outcome, later: Outcome) -> bool:
-    return type(earlier) is type(later) and isinstance(earlier, Kept | HaltsKept)
+    return type(earlier) is type(later) and isinstance(earlier, Committed | HaltsKept)
 
 
 class DurableStore:

@@ -3,7 +3,7 @@
 from contextlib import AbstractContextManager
 from typing import Protocol
 
-from mav_tasks.store.base import NonceTaken
+from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.connection import Connection
 from mav_tasks.store.retention import Trimmer

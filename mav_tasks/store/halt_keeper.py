@@ -11,7 +11,8 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 
 from mav_tasks.basics.mailbox import Mailbox
-from mav_tasks.store.base import HaltNotKept, HaltsKept, Outcome
+from mav_tasks.engine.inputs import HaltNotStored, HaltsKept
+from mav_tasks.store.base import Outcome
 from mav_tasks.store.failures import words_for
 from mav_tasks.store.halt_record import HaltRecord, Word
 from mav_tasks.tasks.events import QueuePaused
@@ -64,7 +65,7 @@ class HaltKeeper:
         for word in self._unkept.values():
             if word.is_halt and word.number > self._kept_through():
                 self._mail.put(
-                    HaltNotKept(word.vehicle, f"store {self._name}: lost: {_told(word)}")
+                    HaltNotStored(word.vehicle, f"store {self._name}: lost: {_told(word)}")
                 )
 
     def _run(self) -> None:
@@ -108,7 +109,7 @@ class HaltKeeper:
         if word.is_halt and now >= self._report_at.setdefault(word.key, now + GRACE):
             self._report_at[word.key] = now + REPORT
             text = f"store {self._name}: halt not stored ({why}): {_told(word)}"
-            self._mail.put(HaltNotKept(word.vehicle, text))
+            self._mail.put(HaltNotStored(word.vehicle, text))
 
 
 def _told(word: Word) -> str:

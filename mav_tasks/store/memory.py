@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 from mav_tasks.basics.errors import StoreError
 from mav_tasks.config.settings import Retention
-from mav_tasks.store.base import JournalReader, Kept, Outcome, Which
+from mav_tasks.engine.inputs import Committed
+from mav_tasks.store.base import JournalReader, Outcome, Which
 from mav_tasks.store.opening import IN_MEMORY
 from mav_tasks.tasks.events import Event
 
@@ -38,11 +39,11 @@ class MemoryStore:
             del self.events[: -self._capacity]
 
     def take_outcomes(self) -> list[Outcome]:
-        """Return a Kept of the last event, if it is new since the last call."""
+        """Return a Committed of the last event, if it is new since the last call."""
         if self._reported == self._count:
             return []
         self._reported = self._count
-        return [Kept(self._count)]
+        return [Committed(self._count)]
 
     def fileno(self) -> None:
         """Return None: outcomes are available right after ``append``."""

@@ -11,7 +11,8 @@ from threading import Thread
 
 from mav_tasks.basics.clock import boot_time
 from mav_tasks.basics.mailbox import Mailbox
-from mav_tasks.store.base import Kept, NonceTaken, NotKept, Outcome
+from mav_tasks.engine.inputs import Committed, NonceTaken, StoreFailed
+from mav_tasks.store.base import Outcome
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
@@ -86,7 +87,7 @@ class Writer:
         self._thread.join(within + LAST_TRY)
         if self._thread.is_alive() and self._writing:
             words = f"{self._writing} events or more may be lost: the last try takes too long"
-            self._mail.put(NotKept(f"store {self._name}: {words}"))
+            self._mail.put(StoreFailed(f"store {self._name}: {words}"))
 
     def utc(self) -> float:
         """Return the wall clock's time, s since 1970."""
@@ -140,7 +141,7 @@ class Writer:
         self._must_reopen = False
         if self._reported_at is not None:
             self._reported_at = None
-            self._mail.put(Kept(self._database.last_number - self._base))
+            self._mail.put(Committed(self._database.last_number - self._base))
 
     def _write(self, events: Sequence[Event]) -> bool:
         """Retry until the events are written; return False if closing ran out of time."""
@@ -157,7 +158,7 @@ class Writer:
                 words = (
                     f"{len(events)} events or more are lost: not written before the server ended"
                 )
-                self._mail.put(NotKept(f"store {self._name}: {words}"))
+                self._mail.put(StoreFailed(f"store {self._name}: {words}"))
                 return False
             time.sleep(RETRY)
         self._writing = 0
@@ -167,7 +168,7 @@ class Writer:
         if batch.next_id:
             with suppress(OSError):  # only needed after an older file was restored
                 self._record.note_next_id(batch.next_id, number=batch.last)
-        self._mail.put(Kept(batch.last - self._base))
+        self._mail.put(Committed(batch.last - self._base))
         return True
 
     def _is_written(self, batch: Batch) -> bool:
@@ -194,7 +195,7 @@ class Writer:
         now = time.monotonic()
         if self._reported_at is None or now >= self._reported_at + REPORT:
             self._reported_at = now
-            self._mail.put(NotKept(f"store {self._name}: {words}"))
+            self._mail.put(StoreFailed(f"store {self._name}: {words}"))
 
     def _trim(self, *, pause: float = TRIM_PAUSE) -> None:
         """Delete some expired rows if that is due; a disk failure waits for the next time."""
@@ -215,4 +216,4 @@ class Writer:
             words = self._database.failure(error)
             if words is None:
                 raise
-            self._mail.put(NotKept(f"store {self._name}: not closed cleanly: {words}"))
+            self._mail.put(StoreFailed(f"store {self._name}: not closed cleanly: {words}"))

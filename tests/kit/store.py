@@ -7,7 +7,8 @@ from select import POLLIN, poll
 from typing import ClassVar
 
 from mav_tasks.config.settings import Retention
-from mav_tasks.store import HaltsKept, Kept, MemoryStore, NotKept, Outcome
+from mav_tasks.engine.inputs import Committed, HaltsKept, StoreFailed
+from mav_tasks.store import MemoryStore, Outcome
 from mav_tasks.store.halt_record import word_of
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import Event
@@ -40,8 +41,8 @@ class PromptSqliteStore(SqliteStore):
         outcomes = super().take_outcomes()
         while self._kept < len(self.events):
             for outcome in outcomes:
-                assert isinstance(outcome, Kept | HaltsKept), outcome
-                if isinstance(outcome, Kept):
+                assert isinstance(outcome, Committed | HaltsKept), outcome
+                if isinstance(outcome, Committed):
                     self._kept = outcome.through
             if self._kept < len(self.events):
                 mail = self.fileno()
@@ -85,14 +86,14 @@ class LateStore(MemoryStore):
     def take_outcomes(self) -> list[Outcome]:
         outcomes: list[Outcome] = []
         if self._failure is not None:
-            outcomes.append(NotKept(self._failure))
+            outcomes.append(StoreFailed(self._failure))
             self._failure = None
         while self._halts and self._halts[0][0] + self.halts_delay <= self.clock():
             self._kept_halts = self._halts.popleft()[1]
             outcomes.append(HaltsKept(self._kept_halts))
         while self._under_way and self._under_way[0][0] + self.delay <= self.clock():
             self._kept = self._under_way.popleft()[1]
-            outcomes.append(Kept(self._kept))
+            outcomes.append(Committed(self._kept))
         return outcomes
 
     def left_by_a_crash(self) -> list[Event]:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.store import HaltsKept, Kept, MemoryStore, Outcome
+from mav_tasks.engine.inputs import Committed, HaltsKept
+from mav_tasks.store import MemoryStore, Outcome
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
@@ -58,7 +59,7 @@ class Crashing(MemoryStore):
         if through <= self.told:
             return []
         self.told = through
-        return [HaltsKept(through), Kept(through)]
+        return [HaltsKept(through), Committed(through)]
 
 
 def live(world: World, store: Crashing) -> list[Sent]:

@@ -10,7 +10,8 @@ from math import inf
 from pathlib import Path
 
 from mav_tasks.config.settings import Retention
-from mav_tasks.store import NotKept, Outcome
+from mav_tasks.engine.inputs import StoreFailed
+from mav_tasks.store import Outcome
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
 from tests.kit.store import LateStore, PromptSqliteStore
@@ -68,10 +69,10 @@ class UncertainStore(LateStore):
             raise Crash
 
     def take_outcomes(self) -> list[Outcome]:
-        """Return the outcomes of events; while the disk is full, one NotKept."""
+        """Return the outcomes of events; while the disk is full, one StoreFailed."""
         if self.clock() >= self.full_until:
             return super().take_outcomes()
-        said: list[Outcome] = [NotKept("the disk is full")] if self._says_so else []
+        said: list[Outcome] = [StoreFailed("the disk is full")] if self._says_so else []
         delay, self.delay, self._says_so = self.delay, inf, False
         try:
             return said + super().take_outcomes()

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from mav_tasks.basics.errors import StoreError
-from mav_tasks.store.base import NonceTaken
+from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_batch
 from mav_tasks.store.codec import dumps

@@ -8,7 +8,7 @@ all gateways are in the order of the commits, and a reader that has seen one has
 from collections.abc import Sequence
 
 from mav_tasks.basics.clock import boot_time
-from mav_tasks.store.base import NonceTaken
+from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_rows
 from mav_tasks.store.halt_record import Register, Word

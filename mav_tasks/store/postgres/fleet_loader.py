@@ -13,7 +13,8 @@ from threading import Event, Thread
 from mav_tasks.basics.clock import boot_time
 from mav_tasks.basics.errors import StoreError
 from mav_tasks.basics.mailbox import Mailbox
-from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome, VehiclesLoaded
+from mav_tasks.engine.inputs import IdsGranted, StoreFailed, VehiclesTaken
+from mav_tasks.store.base import Evicted, Outcome
 from mav_tasks.store.holder import Replaced
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, failure
@@ -49,7 +50,7 @@ Job = frozenset[int] | None  # vehicles to load; None: task ids
 
 
 class FleetLoader:
-    """Puts ``IdsGranted`` and ``VehiclesLoaded`` into a mailbox."""
+    """Puts ``IdsGranted`` and ``VehiclesTaken`` into a mailbox."""
 
     def __init__(
         self,
@@ -104,7 +105,7 @@ class FleetLoader:
             now = time.monotonic()
             if now >= self._report_at:
                 self._report_at = now + REPORT
-                self._mail.put(NotKept(f"store {self._address.shown}: {words}"))
+                self._mail.put(StoreFailed(f"store {self._address.shown}: {words}"))
             return False
         return True
 
@@ -135,7 +136,7 @@ class FleetLoader:
         finally:
             session.close()
 
-    def _loaded(self, vehicles: frozenset[int]) -> VehiclesLoaded:
+    def _loaded(self, vehicles: frozenset[int]) -> VehiclesTaken:
         offset, purpose = self._wall_offset(), f"gateway {self._gateway} load"
         with closing(PostgresReader(self._address, purpose=purpose)) as reader:
             ((idle,),) = reader.connection.execute(_IDLE).fetchall()
@@ -145,7 +146,7 @@ class FleetLoader:
         was_running = any(task.state in RUNNING for task in restored.tasks)
         # last: an attempt that fails before must not move it
         lead = self._lead(vehicles)
-        return VehiclesLoaded(
+        return VehiclesTaken(
             tuple(sorted(vehicles)),
             replace(restored, ended_well=not was_running, signing_lead=lead),
         )

@@ -10,7 +10,7 @@ All batches of a fleet hold the lock of the row of ``meta`` until they are commi
 one sees the nonces of those before.
 """
 
-from mav_tasks.store.base import NonceTaken
+from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import dumps
 from mav_tasks.store.postgres.session import Session

@@ -5,8 +5,9 @@ from contextlib import ExitStack, closing
 from dataclasses import replace
 
 from mav_tasks.config.settings import Retention
+from mav_tasks.engine.inputs import HaltsKept, IdsGranted, StoreFailed
 from mav_tasks.store import reading
-from mav_tasks.store.base import Evicted, HaltsKept, IdsGranted, NotKept, Outcome
+from mav_tasks.store.base import Evicted, Outcome
 from mav_tasks.store.durable import CLOSE_LIMIT, DurableStore
 from mav_tasks.store.halt_record import HaltRecord, Word
 from mav_tasks.store.postgres.address import Address
@@ -75,13 +76,13 @@ class FleetStore(DurableStore):
         return replace(restored, gateway=self._gateway)
 
     def load_vehicles(self, vehicles: frozenset[int]) -> None:
-        """Ask for everything about vehicles; ``VehiclesLoaded`` is the answer. Never blocks."""
+        """Ask for everything about vehicles; ``VehiclesTaken`` is the answer. Never blocks."""
         self._loader.ask(vehicles)
 
     def watch_tasks(self, ids: frozenset[int]) -> None:
         """Ask how tasks stand, and for changes from now on; these alone. Never blocks.
 
-        ``TaskStates`` are the answers: one for each task after each call, and later when it ends.
+        ``TasksElsewhere`` are the answers: for each task after each call, and when it ends.
         """
         self._watch.ask(ids)
 
@@ -97,7 +98,7 @@ class FleetStore(DurableStore):
         for outcome in super().take_outcomes():
             if isinstance(outcome, HaltsKept):
                 continue  # on this machine, where the gateway that gets the vehicle cannot read it
-            if isinstance(outcome, NotKept) and self._fleet.is_replaced:
+            if isinstance(outcome, StoreFailed) and self._fleet.is_replaced:
                 outcome = Evicted(outcome.text)
             if isinstance(outcome, IdsGranted):
                 self._left += outcome.count

@@ -13,7 +13,8 @@ from threading import Thread
 
 from mav_tasks.basics.clock import boot_time
 from mav_tasks.basics.mailbox import Mailbox
-from mav_tasks.store.base import Outcome, TaskStates
+from mav_tasks.engine.inputs import TasksElsewhere
+from mav_tasks.store.base import Outcome
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.dependencies import CHANNEL
 from mav_tasks.store.postgres.failures import PostgresError, failure
@@ -30,7 +31,7 @@ States = dict[int, TaskState | None]
 
 
 class TaskWatch:
-    """Puts ``TaskStates`` into a mailbox. It connects when it is asked for the first time."""
+    """Puts ``TasksElsewhere`` into a mailbox. It connects when it is asked for the first time."""
 
     def __init__(self, address: Address, gateway: str, mail: Mailbox[Outcome]) -> None:
         self._address = address
@@ -132,7 +133,7 @@ class TaskWatch:
         }
         self._told = states
         if news:
-            self._mail.put(TaskStates(tuple(news.items())))
+            self._mail.put(TasksElsewhere(tuple(news.items())))
 
 
 def _is_over(state: TaskState | None) -> bool:

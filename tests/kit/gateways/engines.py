@@ -12,11 +12,15 @@ from typing import Any
 from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import (
     FLEET_LINK,
+    Committed,
     FleetChanged,
+    IdsGranted,
     LeaseChanged,
+    NonceTaken,
     Peer,
     TasksElsewhere,
     VehiclesGone,
+    VehiclesTaken,
     WallClock,
 )
 from mav_tasks.fleet.lease import Terms
@@ -26,15 +30,7 @@ from mav_tasks.links.memory import MemoryLink
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
-from mav_tasks.store import (
-    Evicted,
-    IdsGranted,
-    Kept,
-    NonceTaken,
-    Outcome,
-    Store,
-    VehiclesLoaded,
-)
+from mav_tasks.store import Evicted, Outcome, Store
 from mav_tasks.tasks.events import Event, TaskChanged, TaskModified, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from mav_tasks.tasks.restored import Restored
@@ -273,7 +269,7 @@ class GatewayStore:
                 self._outcomes += self._shared.keep(self._waiting, offset=self._offset())
                 self.events += self._waiting
                 self._count += len(self._waiting)
-                self._outcomes.append(Kept(self._count))
+                self._outcomes.append(Committed(self._count))
             else:
                 self._outcomes.append(Evicted("evicted"))
             self._waiting = []
@@ -285,7 +281,7 @@ class GatewayStore:
         lead = self._shared.next_lead(vehicles)
         part = self._shared.part(vehicles, offset=self._offset())
         restored = replace(part, signing_lead=lead)
-        self._outcomes.append(VehiclesLoaded(tuple(sorted(vehicles)), restored))
+        self._outcomes.append(VehiclesTaken(tuple(sorted(vehicles)), restored))
 
     def grant_ids(self) -> None:
         """Answer in ``take_outcomes``."""

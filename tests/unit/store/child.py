@@ -11,7 +11,8 @@ import signal
 import sys
 import time
 
-from mav_tasks.store import HaltNotKept, Kept, NotKept, open_store
+from mav_tasks.engine.inputs import Committed, HaltNotStored, StoreFailed
+from mav_tasks.store import open_store
 from tests.unit.store.samples import submitted
 
 UNDER_WAY = 50  # events appended and not yet kept
@@ -39,10 +40,10 @@ def main(place: str, limit: int | None) -> None:
         if sys.stdin.fileno() in readable and sys.stdin.readline():
             resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
         for outcome in store.take_outcomes():
-            if isinstance(outcome, Kept):
+            if isinstance(outcome, Committed):
                 kept = before + outcome.through
                 print(f"kept {kept}", flush=True)
-            elif isinstance(outcome, NotKept | HaltNotKept):
+            elif isinstance(outcome, StoreFailed | HaltNotStored):
                 print(outcome.text, flush=True)
 
 

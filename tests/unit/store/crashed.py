@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from mav_tasks.store import HaltsKept
+from mav_tasks.engine.inputs import HaltsKept
 from mav_tasks.tasks.events import Event, TaskSubmitted
 from tests.kit.databases import locked
 from tests.unit.store.samples import PATIENCE, next_outcomes, opened

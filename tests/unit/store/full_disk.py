@@ -11,7 +11,8 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from mav_tasks.store import HaltsKept, NotKept, open_store
+from mav_tasks.engine.inputs import HaltsKept, StoreFailed
+from mav_tasks.store import open_store
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason
 from tests.unit.store.samples import loaded, next_outcomes, opened, submitted, wait_for_failure
@@ -42,7 +43,7 @@ def stop_on_full_disk(path: Path) -> None:
     store = open_store(str(path))
     fill(path.parent / "filler")
     store.append([submitted(number) for number in range(1, 1000)])  # more than the log has room for
-    failure: NotKept = wait_for_failure(store)
+    failure: StoreFailed = wait_for_failure(store)
     print("not kept" if "full" in failure.text else failure.text, flush=True)
     store.append([QueuePaused(1, TaskReason.STOPPED, "client", 100.0)])
     while not any(isinstance(outcome, HaltsKept) for outcome in next_outcomes(store)):

@@ -8,8 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from mav_tasks.config.settings import Retention
+from mav_tasks.engine.inputs import Committed, StoreFailed
 from mav_tasks.kinds import Move
-from mav_tasks.store import Kept, NotKept, Outcome, Store, kind_of
+from mav_tasks.store import Outcome, Store, kind_of
 from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
@@ -97,16 +98,16 @@ def keep(store: Store, *events: Event) -> list[Outcome]:
 def wait_for(store: Store, through: int) -> list[Outcome]:
     """Wait until events are kept, woken by the descriptor; gives all outcomes until then."""
     outcomes: list[Outcome] = []
-    while Kept(through) not in outcomes:
+    while Committed(through) not in outcomes:
         outcomes += next_outcomes(store)
     return outcomes
 
 
-def wait_for_failure(store: Store) -> NotKept:
+def wait_for_failure(store: Store) -> StoreFailed:
     """Wait until the store says that something is not kept."""
     while True:
         for outcome in next_outcomes(store):
-            if isinstance(outcome, NotKept):
+            if isinstance(outcome, StoreFailed):
                 return outcome
 
 

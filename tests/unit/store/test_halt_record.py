@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.basics.errors import StoreError
-from mav_tasks.store import HaltNotKept
+from mav_tasks.engine.inputs import HaltNotStored
 from mav_tasks.tasks.events import (
     Event,
     QueueContinued,
@@ -124,11 +124,11 @@ def test_a_halt_that_neither_keeps_is_reported_and_one_that_the_database_keeps_i
         outcomes = keep(store, STOP)
         stack.enter_context(locked(place))
         store.append([QueuePaused(2, R.STOPPED, "client", 102.0), QueueContinued(3, "client", 1.0)])
-        while not any(isinstance(outcome, HaltNotKept) for outcome in outcomes):
+        while not any(isinstance(outcome, HaltNotStored) for outcome in outcomes):
             outcomes += next_outcomes(store)
         store.close()
         outcomes += store.take_outcomes()
-    at_once, at_last = (each for each in outcomes if isinstance(each, HaltNotKept))
+    at_once, at_last = (each for each in outcomes if isinstance(each, HaltNotStored))
     assert at_once.vehicle == at_last.vehicle == 2
     assert "removed or replaced" in at_once.text
     assert "lost: rover 2: STOP by client" in at_last.text

@@ -13,8 +13,9 @@ from hypothesis import HealthCheck, given, settings
 
 from mav_tasks.basics.errors import StoreError
 from mav_tasks.config.settings import Retention
+from mav_tasks.engine.inputs import Committed
 from mav_tasks.kinds import Pose
-from mav_tasks.store import Kept, Which, kind_of, open_store
+from mav_tasks.store import Which, kind_of, open_store
 from mav_tasks.tasks.events import (
     Event,
     ParameterSet,
@@ -219,7 +220,7 @@ def test_closing_writes_what_is_left_and_notes_the_end(place: str) -> None:
     with opened(place) as store:
         store.append([submitted(n) for n in range(1, 3000)])
         store.close()
-        assert store.take_outcomes()[-1] == Kept(2999)
+        assert store.take_outcomes()[-1] == Committed(2999)
         store.close()
         with pytest.raises(ValueError, match="closed"):
             store.append([])
@@ -278,7 +279,7 @@ def test_a_locked_store_holds_nothing_up_and_nothing_is_lost(place: str) -> None
         assert "locked" in failure.text
         assert longest < 0.1
         other.execute("ROLLBACK")
-        assert wait_for(store, 100)[-1] == Kept(100)
+        assert wait_for(store, 100)[-1] == Committed(100)
         assert [event for _, event in store.journal()] == [submitted(n) for n in range(1, 101)]
 
 
@@ -320,7 +321,7 @@ def test_a_store_in_memory_keeps_the_order_and_no_state_over_runs() -> None:
     with closing(open_store(":memory:")) as store:
         assert store.load() is None
         events = cancelled(1, at=1.0)
-        assert keep(store, *events)[-1] == Kept(2)
+        assert keep(store, *events)[-1] == Committed(2)
         assert list(store.journal()) == list(enumerate(events, 1))
         store.append(events * 100_000)
         assert [number for number, _ in store.journal()] == list(range(100_003, 200_003))

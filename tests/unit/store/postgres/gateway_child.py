@@ -6,7 +6,7 @@
 import select
 import sys
 
-from mav_tasks.store import Kept
+from mav_tasks.engine.inputs import Committed
 from tests.unit.store.postgres.gateways import Gateway, of_vehicle
 
 UNDER_WAY = 50  # events appended and not yet kept
@@ -25,7 +25,7 @@ def main(url: str, name: str) -> None:
         assert fd is not None
         select.select([fd], [], [])
         for outcome in gateway.store.take_outcomes():
-            if isinstance(outcome, Kept):
+            if isinstance(outcome, Committed):
                 kept = outcome.through
                 print(f"kept {kept}", flush=True)
 

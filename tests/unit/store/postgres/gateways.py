@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
+from mav_tasks.engine.inputs import Committed
 from mav_tasks.fleet.io.lease_database import Answer, LeaseDatabase
 from mav_tasks.fleet.member import Evict, Join, Renew, Request
 from mav_tasks.fleet.rivals import Eviction
-from mav_tasks.store import Kept, Outcome
+from mav_tasks.store import Outcome
 from mav_tasks.store.postgres import address
 from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.fleet_store import FleetStore
@@ -121,7 +122,7 @@ class Gateway:
     def kept(self, through: int) -> None:
         """Wait until so many events are kept."""
         while self.through < through:
-            self.through = self.next(Kept).through
+            self.through = self.next(Committed).through
 
     def close(self) -> None:
         self.store.close()

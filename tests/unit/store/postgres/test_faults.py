@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.store import Kept, NotKept, Store
+from mav_tasks.engine.inputs import Committed, StoreFailed
+from mav_tasks.store import Store
 from mav_tasks.tasks.events import TaskSubmitted
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import wait_until
@@ -75,7 +76,7 @@ def check_whole(url: str, *, at_least: int) -> None:
 def write_through(store: Store, numbers: Sequence[int], *, through: int) -> list[str]:
     """Append submissions, wait until they are kept; return the texts of failures until then."""
     store.append([submitted(number) for number in numbers])
-    return [each.text for each in wait_for(store, through) if isinstance(each, NotKept)]
+    return [each.text for each in wait_for(store, through) if isinstance(each, StoreFailed)]
 
 
 @pytest.mark.parametrize("way", ["stop", "kill"])
@@ -307,7 +308,7 @@ def test_a_standby_that_must_confirm_and_does_not_is_waited_for(
             assert "not confirmed by the database: canceling wait for synchronous" in told.text
             store.append([submitted(3)])
             wait_until(lambda: waiters(postgres) not in ([], [waiting]), within=20, what="another")
-            assert not any(isinstance(each, Kept) for each in store.take_outcomes())
+            assert not any(isinstance(each, Committed) for each in store.take_outcomes())
         finally:
             standbys(postgres, "")
         wait_for(store, 3)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from mav_tasks.store import Kept, NonceTaken, VehiclesLoaded
+from mav_tasks.engine.inputs import Committed, NonceTaken, VehiclesTaken
 from mav_tasks.tasks.events import Event, TaskAssigned, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.task import Marks, TaskId
 from tests.kit.postgres import PostgresServer
@@ -31,12 +31,12 @@ def to_any(
     return [TaskSubmitted(task, task.submitted_at), assigned]
 
 
-def outcomes_of(it: Gateway, count: int) -> list[NonceTaken | Kept]:
+def outcomes_of(it: Gateway, count: int) -> list[NonceTaken | Committed]:
     """Return what was told until so many events are kept, in order."""
-    found: list[NonceTaken | Kept] = []
-    while not found or not (isinstance(found[-1], Kept) and found[-1].through >= count):
-        outcome = it.next(NonceTaken | Kept)  # type: ignore[arg-type]
-        assert isinstance(outcome, NonceTaken | Kept)
+    found: list[NonceTaken | Committed] = []
+    while not found or not (isinstance(found[-1], Committed) and found[-1].through >= count):
+        outcome = it.next(NonceTaken | Committed)  # type: ignore[arg-type]
+        assert isinstance(outcome, NonceTaken | Committed)
         found.append(outcome)
     return found
 
@@ -44,12 +44,12 @@ def outcomes_of(it: Gateway, count: int) -> list[NonceTaken | Kept]:
 def test_the_second_task_with_a_nonce_is_not_stored_and_that_is_told_first(url: str) -> None:
     with gateways(url, "a", "b") as (a, b):
         a.store.append(to_any(1))
-        assert outcomes_of(a, 2) == [Kept(2)]
+        assert outcomes_of(a, 2) == [Committed(2)]
         b.store.append([*to_any(1001, vehicle=2), submitted(1002)])
-        assert outcomes_of(b, 3) == [NonceTaken(1001, 1, "payload"), Kept(3)]
+        assert outcomes_of(b, 3) == [NonceTaken(1001, 1, "payload"), Committed(3)]
         assert ids_in(url) == [1, 1002]
         b.store.load_vehicles(frozenset({2}))
-        assert b.next(VehiclesLoaded).restored.tasks == ()
+        assert b.next(VehiclesTaken).restored.tasks == ()
         b.store.append([TaskWithdrawn(TaskId(1001), 2, 101.0)])
         b.kept(4)
         events = [event for _, event in b.store.journal()]
@@ -70,7 +70,7 @@ def test_named_vehicles_other_nonces_and_other_clients_are_not_compared(url: str
         )
         named = TaskSubmitted(replace(task, id=TaskId(1004), choice=""), task.submitted_at)
         b.store.append([*to_any(1001, nonce=78), *to_any(1002, nonce=0), stranger, named])
-        assert outcomes_of(b, 6) == [Kept(6)]
+        assert outcomes_of(b, 6) == [Committed(6)]
         assert ids_in(url) == [1, 1001, 1002, 1003, 1004]
 
 

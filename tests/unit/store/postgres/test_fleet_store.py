@@ -8,8 +8,9 @@ from contextlib import closing
 import pytest
 
 from mav_tasks.basics.errors import StoreError
+from mav_tasks.engine.inputs import IdsGranted, VehiclesTaken
 from mav_tasks.fleet.member import Renew, Take
-from mav_tasks.store import Evicted, IdsGranted, VehiclesLoaded, Which, kind_of
+from mav_tasks.store import Evicted, Which, kind_of
 from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.tasks.events import Event, QueuePaused, VehicleHalted
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -54,7 +55,7 @@ def test_another_gateway_loads_what_one_has_stored_about_a_vehicle(url: str) -> 
         a.store.append(events)
         a.kept(len(events))
         b.store.load_vehicles(frozenset({1}))
-        found = b.next(VehiclesLoaded)
+        found = b.next(VehiclesTaken)
         assert found.vehicles == (1,)
         assert found.restored.tasks == (starting, over)
         assert found.restored.paused == {1: R.OPERATOR}
@@ -74,9 +75,7 @@ def test_after_an_eviction_nothing_is_written_and_it_is_told_once(url: str) -> N
         began = time.monotonic()
         a.store.close()
         assert time.monotonic() - began < 2.5  # it does not try for long
-        assert not [
-            each for each in a.store.take_outcomes() if not isinstance(each, VehiclesLoaded)
-        ]
+        assert not [each for each in a.store.take_outcomes() if not isinstance(each, VehiclesTaken)]
         assert ids_in(url) == [1]
 
 
@@ -187,7 +186,7 @@ def test_a_stop_that_only_the_local_record_has_is_in_force_after_the_next_start(
         b.evict(a)
         a.join()
         a.store.load_vehicles(frozenset({1, 2}))
-        restored = a.next(VehiclesLoaded).restored
+        restored = a.next(VehiclesTaken).restored
         assert restored.paused == {1: R.STOPPED}
         assert restored.halt_epochs == {1: 5, 2: 9}
 
@@ -203,4 +202,4 @@ def test_a_stop_of_a_vehicle_that_another_gateway_has_now_stays_local(
         b.asks(Take(Renew("b", b.epoch), frozenset({1})))
         a.join()
         a.store.load_vehicles(frozenset({1}))
-        assert a.next(VehiclesLoaded).restored.paused == {}
+        assert a.next(VehiclesTaken).restored.paused == {}

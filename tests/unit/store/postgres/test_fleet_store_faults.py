@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.engine.inputs import VehiclesTaken
 from mav_tasks.fleet.member import Renew, Take
-from mav_tasks.store import VehiclesLoaded, Which, kind_of
+from mav_tasks.store import Which, kind_of
 from mav_tasks.store.postgres.failures import PostgresError
 from tests.kit.postgres import PostgresServer
 from tests.kit.processes import wait_until
@@ -78,7 +79,7 @@ def test_another_gateway_has_all_that_a_killed_one_had_kept(url: str, life: int)
             said = int(rest.split()[1])
         evict(b, "a")
         b.store.load_vehicles(frozenset({1}))
-        ids = [task.id for task in b.next(VehiclesLoaded).restored.tasks]
+        ids = [task.id for task in b.next(VehiclesTaken).restored.tasks]
         assert ids == list(range(1, len(ids) + 1))
         assert len(ids) >= said
     with closing(kind_of(url).open_journal(url, Which())) as journal:
@@ -94,11 +95,11 @@ def test_a_clock_that_is_set_changes_neither_idle_times_nor_leads(url: str, wron
         a.store.append([of_vehicle(1, 1)])
         a.kept(1)
         a.store.load_vehicles(frozenset({1}))
-        assert a.next(VehiclesLoaded).restored.signing_lead == STEP
+        assert a.next(VehiclesTaken).restored.signing_lead == STEP
         a.store.close()
         a.open(wall_offset=OFFSET + wrong)
         a.store.load_vehicles(frozenset({1}))
-        restored = a.next(VehiclesLoaded).restored
+        restored = a.next(VehiclesTaken).restored
         assert restored.idle < 60.0
         assert restored.signing_lead == (2 * STEP if wrong < 0 else STEP)
 

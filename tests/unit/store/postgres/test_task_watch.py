@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from mav_tasks.store import TaskStates
+from mav_tasks.engine.inputs import TasksElsewhere
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -50,12 +50,12 @@ def test_every_question_is_answered_and_then_the_end_is_told(
     a, b = pair
     for _ in range(2):
         b.store.watch_tasks(frozenset({1, 77}))
-        assert b.next(TaskStates).states == ((1, S.QUEUED), (77, None))
+        assert b.next(TasksElsewhere).states == ((1, S.QUEUED), (77, None))
     a.store.append([becomes(1, S.STARTING)])
     a.kept(2)
     began = time.monotonic()
     a.store.append([becomes(1, S.COMPLETED)])
-    assert b.next(TaskStates).states == ((1, S.COMPLETED),)
+    assert b.next(TasksElsewhere).states == ((1, S.COMPLETED),)
     assert time.monotonic() - began < NOTIFIED  # it was notified
 
 
@@ -64,14 +64,14 @@ def test_an_end_while_the_session_is_lost_is_told_in_the_next_one(
 ) -> None:
     a, b = pair
     b.store.watch_tasks(frozenset({1}))
-    b.next(TaskStates)
+    b.next(TasksElsewhere)
     a.store.append([becomes(1, S.COMPLETED)])
     with connected(url) as connection:
         connection.execute(
             "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
             " WHERE application_name = 'mav-tasks gateway b tasks'"
         )
-    assert b.next(TaskStates).states == ((1, S.COMPLETED),)
+    assert b.next(TasksElsewhere).states == ((1, S.COMPLETED),)
 
 
 def test_without_the_database_it_says_so_once_and_goes_on_later(
@@ -79,10 +79,10 @@ def test_without_the_database_it_says_so_once_and_goes_on_later(
 ) -> None:
     a, b = pair
     b.store.watch_tasks(frozenset({1}))
-    b.next(TaskStates)
+    b.next(TasksElsewhere)
     with away(postgres, a, b):
         b.store.watch_tasks(frozenset({1, 1001}))
         wait_until(lambda: "cannot see" in caplog.text, within=10)
-    assert b.next(TaskStates).states == ((1, S.QUEUED), (1001, S.QUEUED))
+    assert b.next(TasksElsewhere).states == ((1, S.QUEUED), (1001, S.QUEUED))
     assert caplog.text.count("gateway b cannot see tasks of other gateways") == 1
     assert caplog.text.count("gateway b sees tasks of other gateways again") == 1
