@@ -279,6 +279,10 @@ class World(VirtualWorld):
         """Let time pass until a task is in a state."""
         self.until(lambda: self.state(task_id)[0] is state, within=within)
 
+    def until_faster(self, speed: float, *, within: float = 20) -> None:
+        """Let time pass until the first rover truly drives faster than so many m/s."""
+        self.until(lambda: self.truth.forward_speed > speed, within=within)
+
     def until_idle(self, *, tasks: int, within: float = 60) -> None:
         """Let time pass until all tasks are over and the rovers handed back."""
         self.until(lambda: self.is_idle(tasks=tasks), within=within)
@@ -424,6 +428,10 @@ class World(VirtualWorld):
     def tasks(self) -> tuple[Task, ...]:
         """Return every task of the server."""
         return self.server.engine.snapshot(now=self.now).tasks
+
+    def states(self) -> list[TaskState]:
+        """Return the state of every task of the server."""
+        return [task.state for task in self.tasks()]
 
     def control(self) -> str:
         """Return the phase of the server's control of the first rover."""

@@ -225,7 +225,7 @@ def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
     world.run(1)
     world.client.proceed()
     world.until_idle(tasks=2)
-    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+    assert world.states() == [S.COMPLETED] * 2
 
 
 @for_each("autopilot, words", [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})])

@@ -40,7 +40,7 @@ def test_the_running_task_is_cancelled_once_the_rover_stands(world: World, task:
     world.until_state(1, S.CANCELLED, within=4)
     assert world.stands()
     world.until_idle(tasks=3)
-    assert [t.state for t in world.tasks()] == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
+    assert world.states() == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
     assert world.client.statuses(1)[-1].why == (S.CANCELLED, R.CANCELLED)
 
 
@@ -54,7 +54,7 @@ def test_counted_copies_cancel_one_task_and_get_the_first_ones_answer(
         world.run(repeats_after)
     assert world.client.acks_of(CANCEL) == [(ACCEPTED, 1)] * 4
     world.until_idle(tasks=3)
-    assert [t.state for t in world.tasks()] == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
+    assert world.states() == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
 
 
 def test_a_kill_is_zero_and_hold_at_once_and_no_latch(world: World) -> None:

@@ -85,7 +85,7 @@ def test_last_words_let_a_px4_brake_and_not_drive_back_to_where_hold_began(make_
     world = make_car(PROMPT_PX4)
     seen: set[tuple[str, ...]] = set()
     world.client.move(20, speed=1.0)
-    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
+    world.until_faster(0.9)
     world.server.pump.handle(Shutdown(), now=world.now)
     while world.truth.forward_speed > 0.1:
         seen.add(world.last_words())

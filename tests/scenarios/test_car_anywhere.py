@@ -98,7 +98,7 @@ def test_corners_are_passed_without_stopping_and_slowly_enough(
     world.upload(home + [Item(WAYPOINT, **at(*corner)) for corner in corners])
     nearest, slowest = [99.0] * len(corners), 99.0
     world.client.command(START, target=(1, 1))
-    world.until(lambda: world.truth.forward_speed > 0.4, within=20)
+    world.until_faster(0.4)
     while world.state(1)[0] is S.EXECUTING:
         world.run(0.05)
         nearest = [min(n, off(world, *c)) for n, c in zip(nearest, corners, strict=True)]

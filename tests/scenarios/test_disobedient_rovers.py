@@ -64,7 +64,7 @@ def test_one_that_is_much_too_fast_is_stopped_and_its_task_held(
         world.run(4)
         assert world.state(1)[0] is S.EXECUTING, "a healthy rover overshoots"
         return
-    world.until(lambda: world.truth.forward_speed > most + 0.05, within=3)
+    world.until_faster(most + 0.05, within=3)
     world.until_state(1, S.HELD, within=0.6)
     assert world.state(1)[1] is R.OVERSPEED
     world.run(0.3)

@@ -35,7 +35,7 @@ def test_the_next_task_right_after_the_hand_back_works(world: World, after: floa
     world.run(after)
     world.client.move(0.3, nonce=2)
     world.until_idle(tasks=2)
-    assert [t.state for t in world.tasks()] == [S.COMPLETED, S.COMPLETED]
+    assert world.states() == [S.COMPLETED, S.COMPLETED]
     assert not world.is_armed
 
 

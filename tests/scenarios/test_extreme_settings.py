@@ -38,7 +38,7 @@ def test_stop_stops_and_the_end_too(make_world: MakeWorld, persona: Persona, see
     settings = at_the_ends(Random(seed))
     world = make_world(seed=seed, persona=persona, settings=settings)
     world.client.move(10.0, speed=SPEED)
-    world.until(lambda: world.truth.forward_speed > SPEED / 2, within=30)
+    world.until_faster(SPEED / 2, within=30)
     stop = world.client.stop()
     world.until(world.stands, within=STOPS)
     world.until(lambda: world.control() == "IDLE", within=settings.watch.still_time + 1)
@@ -47,7 +47,7 @@ def test_stop_stops_and_the_end_too(make_world: MakeWorld, persona: Persona, see
 
     world.client.proceed()
     world.client.move(11.0, speed=SPEED)
-    world.until(lambda: world.truth.forward_speed > SPEED / 2, within=30)
+    world.until_faster(SPEED / 2, within=30)
     if settings.watch.motion_fresh <= FRESH:  # what it does is not seen any more
         world.fault(Faults(silent=True))
         world.run(1.0)

@@ -23,7 +23,7 @@ from tests.scenarios.conftest import MakeWorld
 @anew
 def driving(world: World) -> World:
     world.client.move(4)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.until_faster(0.4)
     return world
 
 
@@ -98,7 +98,7 @@ def test_a_rover_that_does_not_stop_on_hold_is_told_so_as_long_as_it_moves(
 
     world = make_world(body=body)
     world.client.move(4)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.until_faster(0.4)
     world.client.move(1)
     since = world.now
     world.client.stop()

@@ -28,7 +28,7 @@ def flaps(world: World, names: set[str], *, down: float, up: float) -> None:
 def driving(world: World) -> World:
     """A rover on its way, 4 m."""
     world.client.move(LENGTH)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.until_faster(0.4)
     return world
 
 
@@ -83,7 +83,7 @@ def test_a_client_that_is_gone_every_second_second_loses_no_task_and_doubles_non
         world.until(lambda: sent[-1].answer, within=3)
     world.until_idle(tasks=5)
     assert [each.answer for each in sent] == [(ACCEPTED, number) for number in range(1, 6)]
-    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 5
+    assert world.states() == [S.COMPLETED] * 5
     assert near_pose(world.pose(), (5 * 0.4, 0.0, 0.0))
     stop = world.client.stop(repeats=repeats)
     world.run(1.1)

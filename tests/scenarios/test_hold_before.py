@@ -20,7 +20,7 @@ def world(make_world: MakeWorld) -> World:
 def driving(world: World) -> World:
     """Have a task drive."""
     world.client.move(20, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.45, within=20)
+    world.until_faster(0.45)
     return world
 
 

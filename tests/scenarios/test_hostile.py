@@ -163,7 +163,7 @@ def test_what_a_revoked_key_drives_stands(world: World) -> None:
     client.arm()
     world.run(1.0)
     client.stream(setpoint(0.5), rate=10)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=5)
+    world.until_faster(0.3, within=5)
     revoked = Key("alice", b"", "operator", ALICE.fingerprint)
     world.server.pump.handle(KeysChanged((revoked, BOB)), now=world.now)
     world.until(world.stands, within=1.5)

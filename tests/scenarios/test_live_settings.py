@@ -25,13 +25,13 @@ def test_the_next_task_is_driven_at_the_new_speed(world: World) -> None:
     change(world, Settings(driving=Driving(speed=1.2)))
     world.until_idle(tasks=1)
     world.client.move(5)
-    world.until(lambda: world.truth.forward_speed > 1.1, within=10)
+    world.until_faster(1.1)
     world.until_idle(tasks=2)
 
 
 def test_a_lower_limit_slows_down_at_once(world: World) -> None:
     world.client.move(10, speed=1.5)
-    world.until(lambda: world.truth.forward_speed > 1.4, within=10)
+    world.until_faster(1.4)
     change(world, Settings(driving=Driving(max_speed=0.6)))
     world.run(3)
     assert world.truth.forward_speed < 0.65

@@ -52,7 +52,7 @@ def test_the_rover_stops_and_resumes_by_itself_after_2_s_of_good_data(
     assert 1.9 < world.now - back < 3.5
     assert world.pose() == where
     world.until_idle(tasks=2)
-    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+    assert world.states() == [S.COMPLETED] * 2
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 

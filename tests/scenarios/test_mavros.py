@@ -55,7 +55,7 @@ def test_two_with_one_address_are_told_apart_by_where_they_are(make_world: MakeW
     one.set_mode(GUIDED)
     world.run(0.5)
     one.arm()
-    world.until(lambda: world.truth.forward_speed > 0.4, within=4)
+    world.until_faster(0.4, within=4)
     assert other.client.acks_of(ARM) == [], "nobody gets the other's answer"
     other.velocity(-0.5)
     world.run(1)

@@ -46,7 +46,7 @@ def driving(make_world: MakeWorld, path: Path, persona: Persona) -> World:
     if "COM_OF_LOSS_T" in world.rover.autopilot.parameters:
         world.rover.autopilot.parameters["COM_OF_LOSS_T"] = 5.0  # it still drives when it is met
     world.client.move(20, speed=1.0)
-    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
+    world.until_faster(0.9)
     world.until(lambda: world.now % 1.0 < 0.05, within=1.1)  # positions precede its next heartbeat
     return world
 

@@ -41,7 +41,7 @@ def test_tasks_wait_until_it_is_ready_and_are_driven_then(waiting: World) -> Non
     assert world.paused() is R.NONE
     world.fault(Faults())
     world.until_idle(tasks=3)
-    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 3
+    assert world.states() == [S.COMPLETED] * 3
     assert near_pose(world.pose(), (0.9, 0.0, 0.0))
 
 

@@ -529,7 +529,7 @@ def test_a_plan_that_is_not_stored_in_time(make_world: MakeWorld, request: str) 
     ask(world, "mission_count 2")
     world.run(5)
     assert world.client.said("not stored in time: not accepted")
-    assert [task.state for task in world.tasks()] == [S.BLOCKED]
+    assert world.states() == [S.BLOCKED]
     download = Download(world.client)
     world.run(1)
     assert download.items[1].x == at(1, 0)["x"]

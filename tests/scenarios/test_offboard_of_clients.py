@@ -72,7 +72,7 @@ def test_the_recipe_of_stream_mode_and_arming_drives(make_world: MakeWorld, *, a
         armed = world.client.arm()
         world.run(0.5)
     assert armed.result == ACCEPTED
-    world.until(lambda: world.truth.forward_speed > 0.5, within=5)
+    world.until_faster(0.5, within=5)
     assert world.mode() is Mode.GUIDED
     assert [t for t in world.client.texts() if "setpoints dropped" in t] == [
         "setpoints dropped: set Offboard first",

@@ -30,7 +30,7 @@ def test_a_task_right_after_the_last_is_no_takeover(world: World, pause: float) 
     world.run(pause)
     world.client.move(0.3)
     world.until_idle(tasks=2)
-    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+    assert world.states() == [S.COMPLETED] * 2
     assert world.events(QueuePaused) == []
 
 
@@ -77,7 +77,7 @@ def test_continue_soon_after_stop_lets_the_next_task_run(world: World, after: fl
     world.client.proceed()
     world.until_idle(tasks=2)
     assert waiting.task_id == 2
-    assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
+    assert world.states() == [S.KILLED, S.COMPLETED]
 
 
 @for_each("who", ["client", "operator"])

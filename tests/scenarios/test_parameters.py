@@ -121,7 +121,7 @@ def test_a_change_has_effect_and_everybody_is_told(world: World) -> None:
     assert told(world.client) == [("TSK_SPEED", 0.8)]
     assert told(other)[-1] == ("TSK_SPEED", 0.8)
     world.client.move(3)
-    world.until(lambda: world.truth.forward_speed > 0.75, within=10)
+    world.until_faster(0.75)
     world.until_idle(tasks=1)
 
 

@@ -43,7 +43,7 @@ def test_a_task_that_outranks_enough_interrupts_and_the_other_resumes(
     world.until_idle(tasks=3)
     ended = [e.task_id for e in world.events(TaskChanged) if e.new is S.COMPLETED]
     assert ended == [3, 2, 1]
-    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 3
+    assert world.states() == [S.COMPLETED] * 3
     assert near_pose(world.pose(), (3.0, 0.0, 0.0))
 
 
@@ -124,6 +124,6 @@ def test_whatever_interrupts_it_ends_where_it_would_have_ended(
                 world.run(3.6)
             world.client.proceed()
     world.until_idle(tasks=others, within=240)
-    assert [t.state for t in world.tasks()] == [S.COMPLETED] * others
+    assert world.states() == [S.COMPLETED] * others
     assert near_pose(world.pose(), end), world.pose()
     assert hypot(world.truth.forward_speed, world.truth.yaw_rate) < 0.05

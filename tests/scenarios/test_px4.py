@@ -64,7 +64,7 @@ class TestDriving:
         go_to(world, -1.0, 2.0)
         world.client.command(DRIVE, 0.5, 0, 2.0)
         world.until_idle(tasks=3, within=90)
-        assert [task.state for task in world.tasks()] == [S.COMPLETED] * 3
+        assert world.states() == [S.COMPLETED] * 3
         story = [what for what in world.observer.sent_since(active) if what not in ("511", "512")]
         order = list(dict.fromkeys(story))
         assert order == ["HOLD", "zero", "arm", "stay", "GUIDED", "move", "disarm"]
@@ -167,7 +167,7 @@ class TestStop:
     def test_ends_a_drive(self, make_world: MakeWorld, persona: Persona) -> None:
         world = make_world(persona=persona)
         world.client.move(20, speed=1.0)
-        world.until(lambda: world.truth.forward_speed > 0.8, within=20)
+        world.until_faster(0.8)
         sent = world.client.stop()
         world.run(4)
         assert sent.answer == (ACCEPTED, 1)

@@ -24,7 +24,7 @@ def driving(make_world: MakeWorld, *, speed: float = 1.5, lost: float = 1.0, **k
     world = make_world(**kw)
     world.rover.autopilot.parameters["COM_OF_LOSS_T"] = lost
     world.client.move(60, speed=speed)
-    world.until(lambda: world.truth.forward_speed > speed - 0.06, within=20)
+    world.until_faster(speed - 0.06)
     return world
 
 

@@ -95,7 +95,7 @@ def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
     assert world.paused() is R.OPERATOR
     world.client.proceed()
     world.until_idle(tasks=2)
-    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+    assert world.states() == [S.COMPLETED] * 2
     assert near_pose(world.pose(), (2.0, 0.0, 0.0))
 
 

@@ -25,7 +25,7 @@ def driving(make_world: MakeWorld, persona: Persona) -> World:
     world = make_world(persona=persona)
     world.client.move(4)
     world.client.move(0.5, nonce=2)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.until_faster(0.4)
     return world
 
 
@@ -142,7 +142,7 @@ def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_fir
     assert world.state(1)[0] is S.HELD
     assert proceed(world).result == ACCEPTED
     world.until_idle(tasks=2)
-    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+    assert world.states() == [S.COMPLETED] * 2
 
 
 def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
@@ -151,7 +151,7 @@ def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
     """A PX4's mode is in its next heartbeat, up to a second after its positions began anew."""
     world = make_world(persona=PX4)
     world.client.move(4)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.until_faster(0.4)
     world.fault(Faults(withheld=frozenset({0})))  # its heartbeat comes last
     restart(world, up=2.0)
     world.fault(Faults())

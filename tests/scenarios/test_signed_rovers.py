@@ -95,7 +95,7 @@ def test_a_rover_that_signs_does_not_come_back_where_nobody_signs(make_world: Ma
 def test_without_its_key_it_is_lost_and_stands(make_world: MakeWorld) -> None:
     world = signed_world(make_world)
     move = world.client.move(30.0)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     world.server.pump.handle(KeysChanged((REVOKED, OTHER)), now=world.now)
     world.server.pump.turn(now=world.now)
     world.until(world.stands, within=10)
@@ -109,7 +109,7 @@ def test_a_stop_reaches_it_though_its_key_was_revoked(make_world: MakeWorld) -> 
     """It is not believed any more; but it hears nobody else, and must not be left driving."""
     world = signed_world(make_world)
     world.client.move(30.0)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     world.server.pump.handle(KeysChanged((REVOKED, OTHER)), now=world.now)
     world.client.stop()
     world.until(lambda: world.mode() is Mode.HOLD, within=1.0)

@@ -72,7 +72,7 @@ def test_continue_resumes_to_the_exact_end_on_the_original_line(driving: World, 
     proceed = world.client.proceed()
     world.until_idle(tasks=2)
     assert proceed.answer == (ACCEPTED, 1)
-    assert [t.state for t in world.tasks()] == [S.COMPLETED, S.COMPLETED]
+    assert world.states() == [S.COMPLETED, S.COMPLETED]
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 

@@ -60,7 +60,7 @@ class Way:
 def driving(world: World, goal: str, speed: float) -> World:
     """A rover at full speed on a task, another task waits."""
     GOALS[goal](world, speed)
-    world.until(lambda: world.truth.forward_speed > 0.95 * speed, within=15)
+    world.until_faster(0.95 * speed, within=15)
     world.client.rotate(90)
     world.run(0.2)
     return world

@@ -24,7 +24,7 @@ MAKES = [PROMPT, PROMPT_PX4]
 def drives(world: World, *, distance: float = 4.0) -> None:
     """Begin a move, and let the rover come to its speed."""
     world.client.move(distance)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=15)
+    world.until_faster(0.4, within=15)
 
 
 @for_each("days", [1, 24, 25, 30, 49])

@@ -68,7 +68,7 @@ def test_a_first_packet_that_comes_again_and_again_undoes_no_newer_halt(world: W
     person, script = world.add_client("person"), world.add_client("script", system_id=245)
     script.heartbeats = False
     world.client.move(30)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     world.client.pause()
     world.run(3)
     first = script.send(command_long(PAUSE_CONTINUE, 1))

@@ -44,7 +44,7 @@ def other(world: World) -> FakeClient:
 def paused_while_driving(world: World) -> None:
     """Let a task of two run and be paused."""
     world.client.move(60, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     world.client.move(30, speed=0.5)
     world.client.pause()
     world.run(4)
@@ -78,7 +78,7 @@ def test_a_second_copy_of_an_older_halt_takes_no_later_ones_place(
     world: World, other: FakeClient, halt: str, first: str
 ) -> None:
     world.client.move(60, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     words = {
         "pause": command_long(PAUSE_CONTINUE, 0),
         "HOLD": command_long(SET_MODE, 1, HOLD, target=(1, 1)),

@@ -32,7 +32,7 @@ HALTS = {
 def driving(world: World) -> World:
     world.client.move(30)
     world.client.move(5)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     return world
 
 

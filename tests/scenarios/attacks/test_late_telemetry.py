@@ -72,7 +72,7 @@ def test_a_delay_that_grows_leads_nobody_over_a_fence(
 def test_what_comes_in_time_again_drives_on_to_the_exact_end(make_world: MakeWorld) -> None:
     world = make_world()
     world.client.move(4)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.until_faster(0.4)
     begin = world.now
     world.net.buffers[DOWN] = Queue(lambda now: 2.0 if now < begin + 5 else 0.0)
     world.run(2.5)

@@ -112,7 +112,7 @@ def test_disarming_ends_what_waits_for_a_silent_rover(world: World, hears: bool)
     """Whether it was carried out nobody knows until the rover is heard again."""
     person = world.add_client("person")
     world.client.move(20)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     world.watched.loses = lambda source, target, _: (
         source == "rover1" or (target == "rover1" and not hears)
     )
@@ -223,7 +223,7 @@ PAUSES = ("pause", "HOLD", "takeover")
 def held_and_paused(world: World, how: str) -> None:
     """Have a task held, and then the queue paused."""
     world.client.move(10)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
+    world.until_faster(0.3)
     world.fault(Faults(position_jump=(5.0, 0.0)))
     world.until_state(1, S.HELD, within=2)
     world.run(3)

@@ -131,7 +131,7 @@ def test_a_cancel_of_what_is_held_since_lets_nothing_else_go(world: World) -> No
     """It was driven when its sender called it off; now somebody has to look first."""
     world.client.move(20)
     world.client.move(20)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.until_faster(0.3)
     world.observer.expects_gaps = True
     in_the_standstill(world, command_long(CANCEL, 1))
     assert moved(world, 6) < 0.01

@@ -96,7 +96,7 @@ def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str)
         "SET_MODE": set_mode(AUTO),
     }[way]
     station.send(word)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
+    world.until_faster(0.3)
     station.send(word)
     world.run(0.5)
     HALTS[halt](world, person)

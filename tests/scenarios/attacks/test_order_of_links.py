@@ -58,7 +58,7 @@ def world(make_world: MakeWorld) -> World:
     plan = (Item(WAYPOINT, frame=0, current=1), Item(WAYPOINT, **at(12.0, 0.0)))
     world.upload(plan)
     world.client.send(GO_WORDS["start"])
-    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
+    world.until_faster(0.3)
     world.client.pause()
     world.run(4)
     return world

@@ -98,7 +98,7 @@ def test_a_halt_after_it_lets_no_older_continue_through(
     person = world.add_client("person", system_id=254)
     world.run(1)
     world.client.move(20)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=20)
+    world.until_faster(0.4)
     person.pause()
     world.run(3)
     script.proceed()

@@ -19,7 +19,7 @@ BOTH = [True, False]
 def driving(world: World, distance: float = 20.0) -> None:
     """Let a task drive for a while."""
     world.client.move(distance, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.45, within=20)
+    world.until_faster(0.45)
     world.run(2)
 
 

@@ -57,7 +57,7 @@ def test_a_go_to_of_another_behind_the_same_router_does_not_undo_a_hold(
     roles = Roles(addresses={"245/190": "submitter"})
     world = make_world(persona=PROMPT_PX4, settings=Settings(roles=roles))
     world.client.move(20, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.45, within=20)
+    world.until_faster(0.45)
     ask_mode(world.client, HOLD)
     world.run(0.3)
     router_packs_as_another = common.MAVLink(None, 245, 190)

@@ -145,7 +145,7 @@ def test_a_mode_asked_for_before_a_halt_is_no_clients_after_it(world: World) -> 
 def px4(make_world: MakeWorld) -> World:
     world = make_world(persona=PROMPT_PX4)
     world.client.move(20, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.45, within=20)
+    world.until_faster(0.45)
     return world
 
 
