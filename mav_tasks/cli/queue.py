@@ -7,8 +7,7 @@ import typer
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
-from mav_tasks.cli.session import is_alone, opened
-from mav_tasks.client.aio import Client
+from mav_tasks.cli.session import is_alone, opened, queues_of
 from mav_tasks.client.json_form import queue_json
 from mav_tasks.client.values import QueueStatus
 
@@ -34,16 +33,10 @@ async def queue(
         if watch:
             from mav_tasks.cli.watch import watch_queues  # noqa: PLC0415
 
-            await watch_queues(client, common, limit=limit)
+            await watch_queues(client, common, show, limit=limit)
             return
-        queues = await fetch(client, common, limit=limit)
+        queues = await queues_of(client, common, limit=limit)
         show(queues, common, is_alone=is_alone(client, common))
-
-
-async def fetch(client: Client, common: Common, *, limit: int) -> list[QueueStatus]:
-    """Return the queue of the named rover, or of all rovers."""
-    meant = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
-    return [await client.queue(vehicle=vehicle, limit=limit) for vehicle in meant]
 
 
 def show(queues: list[QueueStatus], common: Common, *, is_alone: bool) -> None:

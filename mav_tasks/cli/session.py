@@ -9,7 +9,7 @@ from mav_tasks.cli import output
 from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
-from mav_tasks.client.values import News, Text
+from mav_tasks.client.values import News, QueueStatus, Text
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.tasks.task import ANY
 
@@ -114,3 +114,9 @@ async def find_task(client: Client, common: Common, task_id: int) -> Task:
         anyone = client.vehicles()[0].id
         vehicle = (await client.status(task_id, vehicle=anyone)).vehicle
     return await client.task(task_id, vehicle=vehicle)
+
+
+async def queues_of(client: Client, common: Common, *, limit: int) -> list[QueueStatus]:
+    """Return the queue of the named rover, or of all rovers."""
+    meant = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
+    return [await client.queue(vehicle=vehicle, limit=limit) for vehicle in meant]

@@ -2,6 +2,7 @@
 
 import asyncio
 import signal
+from collections.abc import Callable
 from contextlib import suppress
 
 from rich.console import Group
@@ -11,8 +12,7 @@ from rich.text import Text
 from mav_tasks.basics.errors import NoAnswer
 from mav_tasks.cli import output
 from mav_tasks.cli.options import Common
-from mav_tasks.cli.queue import fetch, show
-from mav_tasks.cli.session import is_alone
+from mav_tasks.cli.session import is_alone, queues_of
 from mav_tasks.cli.tables import queue_table
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
@@ -22,19 +22,26 @@ PERIOD = 1.0  # s between two requests
 OLD = 2.5  # s without an answer, after which the view says so
 
 
-async def watch_queues(client: Client, common: Common, *, limit: int) -> None:
-    """Show queues until cancelled; keep trying if the server does not answer."""
+async def watch_queues(
+    client: Client, common: Common, show: Callable[..., None], *, limit: int
+) -> None:
+    """Show queues until cancelled; keep trying if the server does not answer.
+
+    ``show``: prints queues where there is no screen to draw on.
+    """
     if common.json or not output.is_drawn_on():
-        await _print_changes(client, common, limit=limit)
+        await _print_changes(client, common, show, limit=limit)
     else:
         await _draw(client, common, limit=limit)
 
 
-async def _print_changes(client: Client, common: Common, *, limit: int) -> None:
+async def _print_changes(
+    client: Client, common: Common, show: Callable[..., None], *, limit: int
+) -> None:
     told: list[object] = []
     while True:
         with suppress(NoAnswer):
-            queues = await fetch(client, common, limit=limit)
+            queues = await queues_of(client, common, limit=limit)
             if (seen := [_essence(queue) for queue in queues]) != told:
                 told = seen
                 show(queues, common, is_alone=is_alone(client, common))
@@ -53,7 +60,7 @@ async def _draw(client: Client, common: Common, *, limit: int) -> None:
             while True:
                 with suppress(NoAnswer):
                     most = min(limit, live.console.height)
-                    queues = await fetch(client, common, limit=most)
+                    queues = await queues_of(client, common, limit=most)
                     window.take(queues, is_alone=is_alone(client, common))
                 live.refresh()
                 await asyncio.sleep(PERIOD)

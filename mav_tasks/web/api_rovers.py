@@ -4,10 +4,12 @@ import asyncio
 from typing import TypeVar
 
 from mav_tasks.client.aio import Client
+from mav_tasks.client.asking import parts_of
 from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
+from mav_tasks.client.operations import OPERATION
 from mav_tasks.client.parts import VEHICLE_ID
 from mav_tasks.config.setting_keys.parts import Part, schema_of
-from mav_tasks.config.setting_keys.shapes import LARGEST, Flag, Items, Number, Record
+from mav_tasks.config.setting_keys.shapes import LARGEST, Items, Number, Record
 from mav_tasks.kinds.goto import ON_EARTH
 from mav_tasks.plans import PlanFile
 from mav_tasks.web.goal_places import places_of_items
@@ -102,11 +104,11 @@ def operations(services: Services) -> list[Operation]:
         Operation(
             "POST",
             "/stop",
-            "Stop one rover or all at once; no task runs until you resume",
+            OPERATION["stop"].summary,
             stop,
             body=[
                 Part("vehicle", VEHICLE_ID, "the rover; all if not given"),
-                Part("clear", Flag(), "also cancel the waiting tasks"),
+                *parts_of(OPERATION["stop"]),
             ],
             answer="Stop",
         ),
