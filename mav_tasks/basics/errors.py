@@ -7,6 +7,9 @@ value, or counted (see ``mavlink``).
 
 from errno import EADDRINUSE
 
+#: TASK_REASONs of a request in which a value or a frame is wrong, wherever that is read
+BAD_PARAMETER, BAD_FRAME = 103, 104
+
 
 class MavTasksError(Exception):
     """Root of the tree."""

@@ -10,6 +10,7 @@ from mav_tasks.config.setting_keys.shapes import Name, Number
 from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import Leg, Took
 from mav_tasks.kinds.form import Form, any_number
+from mav_tasks.kinds.params import INTEGERS
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import LARGEST, Sent
 from mav_tasks.mavlink.address import AUTOPILOT
@@ -21,7 +22,6 @@ TIME_LIMIT, LONGEST = 10.0, 600.0  # s, for the answer
 USUAL = 1.0  # s that one takes, for estimates
 LAST_PARAM = 7
 MOST_COMMAND = 65_535
-INTEGERS = (5, 6)  # parameters that an item carries as whole numbers
 
 #: names of usual commands: the command, and parameters by their numbers from 1
 NAMES = MappingProxyType(

@@ -1,7 +1,7 @@
 """Drive and Head: keep a velocity for a time, with a yaw rate or on a heading."""
 
 from dataclasses import dataclass, replace
-from math import copysign, degrees
+from math import copysign, degrees, radians
 from typing import ClassVar
 
 from mav_tasks.config.setting_keys.parts import Part
@@ -9,6 +9,7 @@ from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import Ability, Begun, Leg, Took, WhyNot, anchor_in
 from mav_tasks.kinds.form import DEGREE, DURATION, Form, any_number
 from mav_tasks.kinds.guidance import Situation, Velocity, towards
+from mav_tasks.kinds.params import Given, Parsers, bad, flag, number
 from mav_tasks.kinds.path import moved, wrap
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import Sent
@@ -109,6 +110,34 @@ class Head(Leg):
             return self
         return replace(self, yaw=wrap(anchor_in(progress).yaw + self.yaw), is_relative=False)
 
+
+HEAD_FOR = 3.0  # s that NAV_SET_YAW_SPEED drives: an autopilot's own setpoint time-out
+
+
+def _drive(command: Given, driving: Driving) -> Drive:
+    top, fastest = driving.max_speed, degrees(driving.max_turn_rate)
+    forward = number(command, 1, "forward speed", low=-top, high=top, default=0.0)
+    rate = number(command, 2, "yaw rate", low=-fastest, high=fastest, default=0.0)
+    duration = number(command, 3, "duration", low=0.0, high=driving.max_duration)
+    if duration == 0.0:
+        raise bad("param3 duration is 0: nothing to do", param=3)
+    if forward == rate == 0.0:
+        raise bad("param1 speed and param2 rate are 0: nothing to do", param=1)
+    return Drive(forward, radians(rate), duration)
+
+
+def _set_yaw_speed(command: Given, driving: Driving) -> Head:
+    angle = number(command, 1, "angle", low=-360.0, high=360.0)
+    top = driving.max_speed
+    speed = number(command, 2, "speed", low=-top, high=top)
+    return Head(radians(angle), speed, HEAD_FOR, is_relative=flag(command, 3, "relative"))
+
+
+#: how its commands are read
+PARSERS: Parsers = {
+    MavCmd.TASK_DRIVE: _drive,
+    MavCmd.NAV_SET_YAW_SPEED: _set_yaw_speed,
+}
 
 FORM = Form(
     "drive",

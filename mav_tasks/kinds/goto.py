@@ -1,21 +1,35 @@
 """GoTo: drive to a place, or home."""
 
 from dataclasses import dataclass, replace
-from math import degrees, pi, tau
+from math import degrees, inf, pi, radians, tau
 from typing import Any, ClassVar
 
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Number
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import FACE, WAY, Ability, Base, Begun, anchor_in
 from mav_tasks.kinds.follow import Follow
 from mav_tasks.kinds.form import DEGREE, HEADING, SPEED, Form, any_number, positive
 from mav_tasks.kinds.move import Move
+from mav_tasks.kinds.params import (
+    MAX_WAIT,
+    Given,
+    Parsers,
+    bad,
+    heading_in,
+    needed_place,
+    number,
+    place_in,
+    speed_or_default,
+    whole,
+)
 from mav_tasks.kinds.path import bearing, distance, wrap
 from mav_tasks.kinds.places import GlobalPlace, LocalPlace, Place, Pose
 from mav_tasks.kinds.rotate import Rotate, turn_to
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.kinds.wait import Wait
 from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.float_param import EXACT
 
 E7 = 1e7  # degE7 of a degree: MAVLink's integers
 ON_THE_SPOT = 0.01  # m, acceptance radius if none is given
@@ -152,6 +166,49 @@ def _way(place: Place, *, heading: float | None, wait: float | None, **others: A
 def _home(speed: float | None) -> GoTo:
     return GoTo(None, speed)
 
+
+CHANGE_MODE, RELATIVE_YAW = 1, 2  # MAV_DO_REPOSITION_FLAGS
+MAX_FLAGS = EXACT  # of a bit mask in a float32
+
+
+def _waypoint(command: Given, _driving: Driving) -> GoTo:
+    hold = number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0)
+    radius = number(command, 2, "acceptance radius", low=0.0, high=1000.0, default=0.0)
+    yaw = heading_in(command, 4, turn=360.0)  # degrees; DO_REPOSITION's is in radians
+    return GoTo(needed_place(command), None, radius or None, yaw and radians(yaw), hold)
+
+
+def reposition_flags(command: Given) -> int:
+    """Return the MAV_DO_REPOSITION_FLAGS of a "go to"."""
+    return whole(command, 2, "flags", high=MAX_FLAGS)
+
+
+def _reposition(command: Given, driving: Driving) -> GoTo:
+    speed = None if command.params[0] == -1.0 else speed_or_default(command, 1, driving)
+    radius = number(command, 3, "radius", low=-inf, high=1000.0, default=0.0)
+    yaw = heading_in(command, 4, turn=tau)
+    if yaw is not None and reposition_flags(command) & RELATIVE_YAW:
+        raise bad("param2 relative yaw is not supported, give the heading from north", param=2)
+    return GoTo(needed_place(command), speed, max(radius, 0.0) or None, yaw)
+
+
+def _loiter_time(command: Given, _driving: Driving) -> Wait | GoTo:
+    seconds = number(command, 1, "time", low=0.0, high=MAX_WAIT)
+    here = tuple(command.params[4:6]) == (0.0, 0.0) or place_in(command) is None
+    return Wait(seconds) if here else GoTo(needed_place(command), wait=seconds)
+
+
+def _return(_command: Given, _driving: Driving) -> GoTo:
+    return GoTo(None)
+
+
+#: how its commands are read
+PARSERS: Parsers = {
+    MavCmd.NAV_WAYPOINT: _waypoint,
+    MavCmd.DO_REPOSITION: _reposition,
+    MavCmd.NAV_LOITER_TIME: _loiter_time,
+    MavCmd.NAV_RETURN_TO_LAUNCH: _return,
+}
 
 ON_EARTH = (
     Part("latitude", Number(-90.0, 90.0, "deg"), "latitude, WGS 84", True),

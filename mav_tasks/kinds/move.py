@@ -31,6 +31,7 @@ from mav_tasks.kinds.guidance import (
     clamped,
     towards,
 )
+from mav_tasks.kinds.params import Given, Parsers, bad, number, refuse_reserved, speed_or_default
 from mav_tasks.kinds.path import Spot, cross_track, forward_of, moved, seen_from, wrap
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.rotate import Rotate
@@ -209,6 +210,21 @@ def _heading_error(anchor: Pose, pose: Pose, *, forward: float) -> float:
     back = atan(CROSS_TRACK_GAIN * cross_track(anchor, pose)) * speed_share
     return wrap(anchor.yaw - way * clamped(back, MAX_APPROACH_ANGLE) - pose.yaw)
 
+
+def _move(command: Given, driving: Driving) -> Move:
+    longest = driving.max_distance
+    distance = number(command, 1, "distance", low=-longest, high=longest)
+    speed = speed_or_default(command, 2, driving)
+    refuse_reserved(command, 3)
+    if distance == 0.0:
+        raise bad("param1 distance is 0: nothing to do", param=1)
+    return Move(distance, speed)
+
+
+#: how its commands are read
+PARSERS: Parsers = {
+    MavCmd.TASK_MOVE: _move,
+}
 
 FORM = Form(
     "move",

@@ -24,6 +24,16 @@ from mav_tasks.kinds.base import (
 )
 from mav_tasks.kinds.form import DEGREE, HEADING, RATE, Form, any_number
 from mav_tasks.kinds.guidance import Situation, Velocity, approach
+from mav_tasks.kinds.params import (
+    Given,
+    Parsers,
+    bad,
+    flag,
+    number,
+    rate_or_default,
+    refuse_reserved,
+    whole,
+)
 from mav_tasks.kinds.path import distance, wrap
 from mav_tasks.kinds.places import Pose
 from mav_tasks.kinds.sent import Sent
@@ -159,6 +169,33 @@ def turn_to(have: float, want: float, direction: int) -> float:
 def _face(heading: float, direction: int | None, rate: float | None) -> Face:
     return Face(heading, direction or 0, rate)
 
+
+def _rotate(command: Given, driving: Driving) -> Rotate:
+    turn = degrees(driving.max_turn)
+    angle = number(command, 1, "angle", low=-turn, high=turn)
+    rate = rate_or_default(command, 2, driving)
+    refuse_reserved(command, 3)
+    if angle == 0.0:
+        raise bad("param1 angle is 0: nothing to do", param=1)
+    return Rotate(radians(angle), rate)
+
+
+def _condition_yaw(command: Given, driving: Driving) -> Face | Rotate:
+    angle = number(command, 1, "angle", low=-360.0, high=360.0)
+    rate = rate_or_default(command, 2, driving)
+    direction = whole(command, 3, "direction", low=-1, high=1)
+    if not flag(command, 4, "relative"):
+        return Face(radians(angle), direction, rate)
+    if angle == 0.0:
+        raise bad("param1 angle is 0: nothing to do", param=1)
+    return Rotate(radians(angle if direction >= 0 else -angle), rate)
+
+
+#: how its commands are read
+PARSERS: Parsers = {
+    MavCmd.TASK_ROTATE: _rotate,
+    MavCmd.CONDITION_YAW: _condition_yaw,
+}
 
 FORMS = (
     Form(

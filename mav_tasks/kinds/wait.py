@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from mav_tasks.config.settings import Driving
 from mav_tasks.kinds.base import Leg
 from mav_tasks.kinds.form import DURATION, Form
+from mav_tasks.kinds.params import MAX_WAIT, Given, Parsers, number, whole
 from mav_tasks.kinds.sent import Sent
 from mav_tasks.mavlink.enums import MavCmd
 
@@ -52,5 +54,26 @@ class Wait(Leg):
         over = self.duration - left
         return over if over >= done - LATE else self.duration  # that time came meanwhile
 
+
+def _delay(command: Given, _driving: Driving) -> Wait:
+    wish = command.params[0]
+    if wish < 0.0 or (wish == 0.0 and any(command.params[1:4])):
+        return _time_of_day(command)
+    return Wait(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
+
+
+def _time_of_day(command: Given) -> Wait:
+    until = tuple(
+        whole(command, index, name, low=-1, high=high, default=-1)
+        for index, name, high in ((2, "hour", 23), (3, "minute", 59), (4, "second", 59))
+    )
+    again = [period for part, period in zip(until, (DAY, HOUR, MINUTE), strict=True) if part >= 0]
+    return Wait(again[0], until) if again else Wait(0.0)
+
+
+#: how its commands are read
+PARSERS: Parsers = {
+    MavCmd.NAV_DELAY: _delay,
+}
 
 FORM = Form("wait", "Wait", "Stand still.", (DURATION,), Wait)

@@ -7,6 +7,7 @@ those of the dialect's TASK_STATE and TASK_REASON.
 
 from enum import IntEnum
 
+from mav_tasks.basics import errors
 from mav_tasks.basics.errors import IllegalTransition
 
 
@@ -96,8 +97,8 @@ class TaskReason(IntEnum):
     QUEUE_FULL = 100
     QUOTA = 101
     STORE_UNAVAILABLE = 102
-    BAD_PARAMETER = 103
-    BAD_FRAME = 104
+    BAD_PARAMETER = errors.BAD_PARAMETER
+    BAD_FRAME = errors.BAD_FRAME
     OUTSIDE_FENCE = 105
     NOT_SUPPORTED_BY_VEHICLE = 106
     NOT_FOUND = 107

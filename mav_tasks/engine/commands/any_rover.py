@@ -21,7 +21,7 @@ from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands.assignments import Assignments, check_any, driven_by
 from mav_tasks.engine.commands.command_request import CommandRequest
-from mav_tasks.engine.commands.goals import GOALS, parse_command
+from mav_tasks.engine.commands.goals import parse_command
 from mav_tasks.engine.commands.ordering import AGAIN, has_left_before_halt
 from mav_tasks.engine.commands.submissions import GIVEN_UP, NONCE, Submissions, acknowledge
 from mav_tasks.engine.commands.translate import message_id_of, task_id_of
@@ -30,6 +30,7 @@ from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.services.commands import Answer, Command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.kinds.commands import PARSERS
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult
@@ -44,7 +45,7 @@ R = TaskReason
 REMEMBERS = 10.0  # s for a command that was passed on; clients repeat one within 4 s
 #: commands that mean something only for a rover that the sender knows
 _OF_ONE_ROVER = (MavCmd.DO_REPOSITION, MavCmd.NAV_SET_YAW_SPEED, MavCmd.NAV_RETURN_TO_LAUNCH)
-SUBMITTED = frozenset(GOALS) - frozenset(_OF_ONE_ROVER)
+SUBMITTED = frozenset(PARSERS) - frozenset(_OF_ONE_ROVER)
 
 
 class AnyRequest(CommandRequest):

@@ -7,7 +7,7 @@ from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands import translate
-from mav_tasks.engine.commands.goals import CHANGE_MODE, has_place, marks_of, reposition_flags
+from mav_tasks.engine.commands.goals import marks_of
 from mav_tasks.engine.policy import (
     COMMANDS,
     DISARM,
@@ -19,6 +19,8 @@ from mav_tasks.engine.policy import (
 )
 from mav_tasks.engine.services.commands import NO_MESSAGE, REPEATED, Answer, Command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.kinds.goto import CHANGE_MODE, reposition_flags
+from mav_tasks.kinds.params import has_place
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet

@@ -17,12 +17,6 @@ from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.any_rover import AnyRover
 from mav_tasks.engine.commands.command_request import CommandRequest, halts_again
 from mav_tasks.engine.commands.forwarding import check_relay, relay
-from mav_tasks.engine.commands.goals import (
-    GOALS,
-    bad,
-    has_place,
-    whole,
-)
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
 from mav_tasks.engine.commands.submissions import Submissions, leave_it
@@ -32,6 +26,8 @@ from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
 from mav_tasks.engine.services.commands import COPIED, Answer, Command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.kinds.commands import PARSERS
+from mav_tasks.kinds.params import bad, has_place, whole
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity, TaskProperty
@@ -179,7 +175,7 @@ class Commands:
         match asked.command.command:
             case MavCmd.DO_REPOSITION if claims:
                 self._reposition(asked, now=now)
-            case number if number in GOALS and (claims or is_task_command(number)):
+            case number if number in PARSERS and (claims or is_task_command(number)):
                 self._submissions.submit(asked, now=now)
             case (
                 MavCmd.TASK_CANCEL

@@ -17,7 +17,6 @@ from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import SAFETY
 from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands.command_request import CommandRequest
-from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.translate import IN_FORCE
 from mav_tasks.engine.inputs import Peer, Place
@@ -28,6 +27,7 @@ from mav_tasks.engine.services.orders import Phase, moves
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.kinds.goto import CHANGE_MODE, reposition_flags
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import target_of

@@ -10,10 +10,11 @@ from mav_tasks.basics.latest import keep_latest
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.command_request import CommandRequest
-from mav_tasks.engine.commands.goals import MAX_DELAY, flag, identifier, number, whole
+from mav_tasks.engine.commands.goals import MAX_DELAY
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.services.commands import COPIED, REPEATED, Command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.kinds.params import flag, identifier, number, whole
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece

@@ -14,13 +14,6 @@ from typing import Any, NamedTuple
 
 from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.commands.ability import adapted
-from mav_tasks.engine.commands.goals import (
-    GLOBAL_FRAMES,
-    KNOWN_FRAMES,
-    bad,
-    place_in,
-    refuse_infinite,
-)
 from mav_tasks.engine.missions.plan_table import (
     SKIPPED,
     MissionParseOptions,
@@ -33,6 +26,7 @@ from mav_tasks.engine.missions.plan_table import (
 from mav_tasks.engine.services.commands import NO_MESSAGE, Command
 from mav_tasks.engine.services.missions import Item, packed, unpacked
 from mav_tasks.kinds import GlobalPlace, GoTo, Place
+from mav_tasks.kinds.params import GLOBAL_FRAMES, KNOWN_FRAMES, bad, place_in, refuse_infinite
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult

@@ -14,17 +14,7 @@ from typing import NamedTuple
 from mav_tasks.basics.errors import Rejection
 from mav_tasks.config.settings import Driving
 from mav_tasks.engine.commands.ability import ability_of
-from mav_tasks.engine.commands.goals import (
-    MAX_DELAY,
-    MAX_WAIT,
-    MIN_SPEED,
-    bad,
-    goal_of,
-    identifier,
-    number,
-    place_in,
-    whole,
-)
+from mav_tasks.engine.commands.goals import MAX_DELAY, goal_of
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.engine.services.commands import NO_MESSAGE, Command
 from mav_tasks.engine.services.missions import NOT_GIVEN
@@ -32,6 +22,7 @@ from mav_tasks.engine.services.persona import Persona
 from mav_tasks.kinds import Act, GoTo, Place, Wait
 from mav_tasks.kinds.act import LONGEST, TIME_LIMIT
 from mav_tasks.kinds.base import Ability
+from mav_tasks.kinds.params import MAX_WAIT, MIN_SPEED, bad, identifier, number, place_in, whole
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
 from mav_tasks.tasks.goal import Delay, Jump, Near, Nothing, Perform, SetReverse, SetSpeed, Step

@@ -16,7 +16,6 @@ from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.assignments import Assignments
-from mav_tasks.engine.commands.goals import bad
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.inputs import Place
 from mav_tasks.engine.missions.plan_items import result_of
@@ -35,6 +34,7 @@ from mav_tasks.engine.services.missions import (
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.kinds.params import bad
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavMissionResult
