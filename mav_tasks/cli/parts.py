@@ -30,8 +30,10 @@ def parameter_of(part: Part) -> Parameter:
     words += f": {', '.join(names)}" if names else ""
     name = f"--{part.name.replace('_', '-')}"
     if isinstance(part.shape, Flag):
-        flag = Annotated[bool | None, typer.Option(name, help=f"{words}.")]
-        return Parameter(part.name, Parameter.KEYWORD_ONLY, default=None, annotation=flag)
+        names_of_both = f"{name}/--no-{name.removeprefix('--')}"
+        flag = Annotated[bool | None, typer.Option(names_of_both, help=f"{words}.")]
+        default = Parameter.empty if part.is_required else None
+        return Parameter(part.name, Parameter.KEYWORD_ONLY, default=default, annotation=flag)
     more: dict[str, Any] = {"metavar": _metavar(part), "help": f"{words}."}
     if names:
         more["autocompletion"] = completing(names)

@@ -1,8 +1,9 @@
 """What can be asked of rovers and tasks: each operation declared once.
 
-From it come the routes of the HTTP API and their description, the tools of agents, and the
-commands with their help. What an operation does is the client's method of the same name, which has
-its parts as keywords. Imports nothing that takes time: the help of the command line reads this.
+From it come the routes of the HTTP API and their description, the tools of agents, the names and
+help of commands, and a command for one that has none by hand. What an operation does is the
+client's method of the same name, which has its parts as keywords. Imports nothing that takes time:
+the help of the command line reads this.
 """
 
 from typing import NamedTuple

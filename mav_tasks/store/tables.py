@@ -39,7 +39,9 @@ class Tables:
     def statements(self, found: int) -> Iterator[str]:
         """Yield what makes the present tables of a database with this schema that can be used."""
         for name in ("tables", self.kind) if not found else (f"{self.kind}-{self.schema}",):
-            text = (FOLDER / f"{name}.sql").read_text(encoding="utf-8")
+            lines = (FOLDER / f"{name}.sql").read_text(encoding="utf-8").splitlines()
+            # not every database has each letter of a comment
+            text = "\n".join(line for line in lines if not line.startswith("--"))
             for word, meaning in self.words.items():
                 text = text.replace(f"{{{word}}}", meaning)
-            yield from (each for each in text.split(";\n") if each.strip())
+            yield from (each for each in text.split(";") if each.strip())

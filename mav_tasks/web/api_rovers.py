@@ -1,7 +1,6 @@
-"""Operations on rovers: their state, STOP, pause, resume, queue, fence and rally points."""
+"""Operations on rovers: their state, STOP, queue, fence and rally points."""
 
 import asyncio
-from typing import TypeVar
 
 from mav_tasks.client.aio import Client
 from mav_tasks.client.asking import parts_of
@@ -19,8 +18,6 @@ from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 from mav_tasks.web.stops import Stop
 from mav_tasks.web.users import Line
-
-T = TypeVar("T")
 
 LIMIT = Part("limit", Number(0, 10_000, is_whole=True), "at most this many tasks")
 SPOT = schema_of(ON_EARTH) | {"additionalProperties": True}

@@ -1,4 +1,4 @@
-"""Operations on tasks: submit, show, change, cancel, release."""
+"""Operations on tasks: submit and show."""
 
 from typing import Any
 

@@ -278,16 +278,15 @@ def _is_free(port: int, kind: socket.SocketKind) -> bool:
 
 @cache
 def _ports_of_this_process() -> Iterator[int]:
-    """Return ports that no other test process of this machine gets, each again after all others.
+    """Return ports that no other test process of this user gets, each again after all others.
 
     They lie below the system's ephemeral ports: a server keeps sending to a client that has just
     left, and pushes to ports where nobody may listen. The next user of such a port would receive
     that, and take another test's rover for its own.
     """
     for number in range(SHARES):
-        lock = os.open(
-            Path(gettempdir(), f"mav-tasks-ports-{number}"), os.O_RDONLY | os.O_CREAT, 0o644
-        )
+        name = f"mav-tasks-ports-{os.getuid()}-{number}"
+        lock = os.open(Path(gettempdir(), name), os.O_RDONLY | os.O_CREAT, 0o644)
         with suppress(BlockingIOError):
             flock(lock, LOCK_EX | LOCK_NB)  # until this process ends
             own = PORTS[number::SHARES]

@@ -8,7 +8,7 @@ CREATE INDEX by_number ON tasks (number);
 CREATE INDEX not_over ON tasks (vehicle) WHERE state < 9;
 CREATE INDEX expected ON tasks (run_after) WHERE run_after IS NOT NULL;
 
--- Gateways that share a fleet (fleet_io/lease_database.py). epoch 0: not in the fleet; backend: of the session that asked last.
+-- Gateways that share a fleet (fleet/io/lease_database.py). epoch 0: not in the fleet; backend: of the session that asked last.
 -- hears: vehicles that it hears and does not hold. system_id 0: not known.
 CREATE TABLE gateways (
     number INTEGER GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
