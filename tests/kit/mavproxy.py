@@ -45,9 +45,11 @@ HEADER_LENGTH, CRC_LENGTH = 10, 2
 MAVLINK_2 = 0xFD
 ITS_SYSTEM = 255
 END_OF_FILE = b"\x04"
-#: Its messages about problems, its own findings as well as a rover's answers.
+#: Its messages about problems, its own findings as well as a rover's answers. After it has cleared
+#: a list it may still ask for the missing items of that, which are none: [].
 COMPLAINT = re.compile(
-    r"error|fail|time?d? ?out|no ack|no link|link \d+ down|\blost\b|re-requesting|unexpected|denied"
+    r"error|fail|time?d? ?out|no ack|no link|link \d+ down|\blost\b|unexpected|denied"
+    r"|re-requesting (?!.*\[\])"
     r"|unsupported|reject|not in control|cancelled|traceback|exception|wrapped|breach|stale"
     r"|unknown|unable|invalid|duplicate|\bbad\b|not (?:available|found)|can't",
     re.IGNORECASE,
