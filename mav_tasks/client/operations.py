@@ -6,6 +6,8 @@ client's method of the same name, which has its parts as keywords. Imports nothi
 the help of the command line reads this.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 
@@ -28,7 +30,7 @@ class Operation(NamedTuple):
     no_tool: str = ""
     done: str = "done"
     is_halt: bool = False
-    by_hand: dict[str, str] = {}  # noqa: RUF012  # never changed
+    by_hand: Mapping[str, str] = MappingProxyType({})
 
     @property
     def names(self) -> list[str]:
@@ -92,7 +94,7 @@ OPERATIONS = (
         "task",
         "Change a task that has not ended",
         "priority after before delay at deadline label every cron preemptible preemptive",
-        no_tool="an agent cancels its task and submits it anew",
+        no_tool="an agent cancels its task and submits another one",
         by_hand={
             "command": "reads times and periods as people write them",
             "http": "is the PATCH of the task, and answers with it",

@@ -1,4 +1,4 @@
-"""The tables of a SQLite file; ``user_version`` is their schema's number, 0 if there are none."""
+"""The tables of a SQLite file. ``user_version`` is the number of their schema; 0: no tables."""
 
 import sqlite3
 from collections.abc import Iterator

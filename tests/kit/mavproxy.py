@@ -46,7 +46,7 @@ MAVLINK_2 = 0xFD
 ITS_SYSTEM = 255
 END_OF_FILE = b"\x04"
 #: Its messages about problems, its own findings as well as a rover's answers. After it has cleared
-#: a list it may still ask for the missing items of that, which are none: [].
+#: a list, it may say "re-requesting rally items []": no item is missing then.
 COMPLAINT = re.compile(
     r"error|fail|time?d? ?out|no ack|no link|link \d+ down|\blost\b|unexpected|denied"
     r"|re-requesting (?!.*\[\])"

@@ -7,7 +7,7 @@ from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.session import SCHEMA, Session
 from mav_tasks.store.tables import Tables
 
-LOCK = 0x4D565453_00000002  # of whoever converts: gateways may begin at the same time
+LOCK = 0x4D565453_00000002  # of the process that makes or converts tables; others wait
 #: the comment of the table ``versions``; keeps us from writing to another program's tables
 MARK = "mav-tasks store"
 TABLES = Tables(
