@@ -40,7 +40,7 @@ COMMANDS = (
     Lazy(
         "export",
         "export:export",
-        "Convert recordings to MCAP, for Foxglove and Lichtblick, or back.",
+        "Convert recordings to MCAP, for Foxglove and Lichtblick.",
     ),
     Lazy("config", "config:app", "Show, check and create the configuration of the server."),
     Lazy("keys", "keys:app", "Add, list and revoke signing keys."),
