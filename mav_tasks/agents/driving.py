@@ -1,5 +1,6 @@
 """The tools that move and stop rovers: submit, and those made from declared operations."""
 
+from dataclasses import replace
 from typing import Any
 
 from mav_tasks.agents import submission
@@ -9,12 +10,12 @@ from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
 from mav_tasks.client.asking import ask, parts_of
 from mav_tasks.client.operations import OPERATION, OPERATIONS, Operation
-from mav_tasks.client.parts import AFTER, DEADLINE, DELAY, GOALS, KEY_TEXT, LABEL, PRIORITY
+from mav_tasks.client.parts import GOALS, KEY_TEXT
+from mav_tasks.client.terms import TERMS
 from mav_tasks.config.setting_keys.parts import Part
-from mav_tasks.config.setting_keys.shapes import Items, Number
+from mav_tasks.config.setting_keys.shapes import Items
 from mav_tasks.kinds.in_json import goal_schema
 
-SOON = Number(0, 30 * 86_400, "s")
 SUBMISSION = (
     Part("goals", Items(goal_schema(), 1, 100), GOALS.meaning, True),
     Part(
@@ -25,11 +26,11 @@ SUBMISSION = (
         True,
     ),
     ROVER,
-    PRIORITY,
-    AFTER,
-    Part("start_in", SOON, DELAY.meaning),
-    Part("deadline", SOON, DEADLINE.meaning),
-    LABEL,
+    TERMS["priority"],
+    TERMS["after"],
+    replace(TERMS["delay"], name="start_in"),
+    TERMS["deadline"],
+    TERMS["label"],
 )
 
 

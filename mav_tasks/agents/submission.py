@@ -13,12 +13,12 @@ from mav_tasks.basics.errors import NoAnswer, Refused, UsageError
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
 from mav_tasks.client.idempotency import Numbers, numbers_of
+from mav_tasks.client.terms import Changes, requested
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.client.wire import Goal
 from mav_tasks.kinds.in_json import goals_of
 from mav_tasks.tasks.deduplicator import NONCE_KEPT
 from mav_tasks.tasks.lifecycle import TERMINAL
-from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 LOOKED_AT = 100  # waiting, and finished, tasks of the rover
 MARGIN = 60.0  # s before the server forgets a nonce; a submission takes less
@@ -31,20 +31,13 @@ class Wish:
     rover: int
     goals: Sequence[Goal]
     key: str
-    label: str
-    terms: dict[str, Any]
+    terms: Changes
 
     @classmethod
     def of(cls, rover: int, values: dict[str, Any]) -> "Wish":
         """Return the wish in a tool's arguments. Raise SettingError if a goal is invalid."""
-        goals = goals_of(values["goals"])
-        terms = {
-            "priority": DEFAULT_PRIORITY if values["priority"] is None else values["priority"],
-            "after": values["after"] or 0,
-            "delay": values["start_in"] or 0.0,
-            "deadline": values["deadline"] or 0.0,
-        }
-        return cls(rover, goals, values["idempotency_key"], values["label"] or "", terms)
+        terms = requested(values | {"delay": values["start_in"]})
+        return cls(rover, goals_of(values["goals"]), values["idempotency_key"], terms)
 
 
 async def submit(rovers: Rovers, wish: Wish) -> TaskStatus:
@@ -54,19 +47,14 @@ async def submit(rovers: Rovers, wish: Wish) -> TaskStatus:
     """
     client = await rovers.client()
     # a key belongs to its submitter: another one's equal key has another nonce
-    numbers = numbers_of(f"{rovers.signer} {wish.key}".lstrip(), label=wish.label)
+    numbers = numbers_of(f"{rovers.signer} {wish.key}".lstrip(), wish.terms)
     earlier = await _looked_up(client, wish.rover, numbers)
     if earlier is not None and (earlier.ended_ago or 0.0) > NONCE_KEPT - MARGIN:
         words = f"it was task {earlier.id}, {state_of(earlier)} {earlier.ended_ago:.0f} s ago"
         raise UsageError(f"{_of(wish)}: {words}. To drive again, use a new key")
     try:
         task = await client.submit_mission(
-            wish.goals,
-            vehicle=wish.rover,
-            nonce=numbers.nonce,
-            check=numbers.check,
-            label=wish.label,
-            **wish.terms,
+            wish.goals, vehicle=wish.rover, **numbers._asdict(), **wish.terms
         )
         return await task.refresh()
     except NoAnswer as error:

@@ -28,7 +28,7 @@ def _command_of(operation: Operation) -> Callable[..., None]:
     def read(given: dict[str, Any]) -> dict[str, Any]:
         typed = ((part, given[part.name]) for part in parts)
         return {
-            part.name: part.read({part.name: None if text is None else value_of(part, text)})
+            part.name: part.read({part.name: None if text is None else value_of(part, text)}, "--")
             for part, text in typed
         }
 

@@ -1,7 +1,7 @@
 """Typer commands from async functions, with shared groups of options.
 
-A group is a frozen dataclass with Typer annotations and defaults. A parameter of that type stands
-for all fields of the group as options.
+A group is a frozen dataclass with Typer annotations and defaults, or a class that says which
+``parameters`` it has. A parameter of that type stands for all fields of the group as options.
 """
 
 import asyncio
@@ -49,13 +49,14 @@ def command(body: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., Non
     groups: dict[str, Any] = {
         name: parameter.annotation
         for name, parameter in inspect.signature(body).parameters.items()
-        if dataclasses.is_dataclass(parameter.annotation)
+        if _options_of(parameter.annotation)
     }
 
     def run(**values: Any) -> None:
         for name, group in groups.items():
-            fields = [field.name for field in dataclasses.fields(group)]
-            values[name] = group(**{field: values.pop(field) for field in fields})
+            values[name] = group(
+                **{each.name: values.pop(each.name) for each in _options_of(group)}
+            )
         asyncio.run(body(**values))
 
     parameters = _spread(body)
@@ -69,13 +70,20 @@ def command(body: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., Non
 def _spread(body: Callable[..., Any]) -> list[inspect.Parameter]:
     spread: list[inspect.Parameter] = []
     for parameter in inspect.signature(body).parameters.values():
-        if dataclasses.is_dataclass(parameter.annotation):
-            spread += [
-                inspect.Parameter(
-                    each.name, parameter.KEYWORD_ONLY, default=each.default, annotation=each.type
-                )
-                for each in dataclasses.fields(parameter.annotation)
-            ]
-        else:
-            spread.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+        alone = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+        spread += _options_of(parameter.annotation) or [alone]
     return spread
+
+
+def _options_of(group: Any) -> list[inspect.Parameter]:
+    """Return the options of a group; [] if it is none."""
+    if hasattr(group, "parameters"):
+        return list(group.parameters())
+    if not dataclasses.is_dataclass(group):
+        return []
+    return [
+        inspect.Parameter(
+            each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=each.type
+        )
+        for each in dataclasses.fields(group)
+    ]

@@ -9,17 +9,9 @@ from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.lazy import completing
-from mav_tasks.cli.options import (
-    Common,
-    Deadline,
-    StartAt,
-    StartIn,
-    TaskId,
-    every_of,
-    seconds_of,
-    start_of,
-)
+from mav_tasks.cli.options import Common, TaskId
 from mav_tasks.cli.session import find_task, opened, values_checked
+from mav_tasks.cli.terms import TaskTerms
 from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
@@ -113,71 +105,18 @@ async def clear(
 
 
 @command
-async def modify(
-    task_id: TaskId,
-    common: Common,
-    priority: Annotated[
-        int | None, typer.Option(metavar="0..10", help="Priority of the task; 10 is the highest.")
-    ] = None,
-    start_in: StartIn = "",
-    start_at: StartAt = "",
-    every: Annotated[
-        str,
-        typer.Option(
-            metavar="PERIOD|CRON|never",
-            help="Repeat, as in 'submit'; never: this is the last run.",
-        ),
-    ] = "",
-    deadline: Deadline = "",
-    after: Annotated[
-        int | None, typer.Option(metavar="ID", help="Run after this task has completed; 0: none.")
-    ] = None,
-    before: Annotated[
-        int | None,
-        typer.Option(metavar="ID", help="Place just before this task in the queue; 0: last."),
-    ] = None,
-    preemptible: Annotated[
-        bool | None,
-        typer.Option(
-            "--preemptible/--no-preemptible", help="Whether other tasks may interrupt this one."
-        ),
-    ] = None,
-    preemptive: Annotated[
-        bool | None,
-        typer.Option(
-            "--preemptive/--no-preemptive", help="Whether this task may interrupt others."
-        ),
-    ] = None,
-    label: Annotated[
-        str | None,
-        typer.Option(metavar="TEXT", help="Name of the task, at most 24 bytes of UTF-8; '': none."),
-    ] = None,
-) -> None:
+async def modify(task_id: TaskId, terms: TaskTerms, common: Common) -> None:
     """Change a task that has not ended.
 
     Options that you omit leave the task unchanged.
     """
-    delay, at = start_of(start_in, start_at)
-    until = seconds_of("--deadline", deadline)
-    repeats = every_of(every) if every else None
-    wishes = (priority, delay, at, until, after, before, preemptible, preemptive, label, repeats)
-    if all(wish is None for wish in wishes):
+    changes = terms.read()
+    if not changes:
         raise UsageError(f"modify {task_id}: nothing to change; give --priority or another option")
     async with opened(common) as client:
         task = await find_task(client, common, task_id)
         with values_checked(), in_typed_words():
-            await task.modify(
-                priority=priority,
-                delay=delay,
-                deadline=until,
-                after=after,
-                before=before,
-                preemptible=preemptible,
-                preemptive=preemptive,
-                at=at,
-                label=label,
-                every=repeats,
-            )
+            await task.modify(**changes)
     words = f"rover {task.vehicle}: task {task_id} changed"
     output.say_done(common.json, "modify", words, task=task_id, vehicle=task.vehicle)
 

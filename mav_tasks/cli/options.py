@@ -1,47 +1,17 @@
 """Options that many commands share, as groups for ``command``."""
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Annotated
 
 import typer
 
-from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli.lazy import completing
-from mav_tasks.cli.times import parse_duration, parse_moment
 from mav_tasks.tasks.task import ANY
 
 DEFAULT_SERVER = "udpout:127.0.0.1:14560"
 DEFAULT_LISTEN = "127.0.0.1:8560"  # of the web page
-PRIORITY = 5
-NEVER = "never"  # of --every
 MOST_ROVERS = 255  # system ids
 
-StartIn = Annotated[
-    str, typer.Option("--in", metavar="DURATION", help="Start after this delay: 30s, 5m, 1h30m.")
-]
-StartAt = Annotated[
-    str,
-    typer.Option(
-        "--at",
-        metavar="TIME",
-        help="Start at 14:30 or 2026-11-20T14:30; local time unless it names a zone.",
-    ),
-]
-Every = Annotated[
-    str,
-    typer.Option(
-        metavar="PERIOD|CRON",
-        help="Repeat: 90s, 1h30m, 1d, or a cron expression in UTC or a zone: "
-        "'0 6 * * 1-5 Europe/Zurich'.",
-    ),
-]
-Deadline = Annotated[
-    str,
-    typer.Option(
-        metavar="DURATION", help="The task expires if it has not started within this time."
-    ),
-]
 Wait = Annotated[
     bool,
     typer.Option(
@@ -132,18 +102,8 @@ class AnyCommon(Common):
 
 @dataclass(frozen=True, slots=True)
 class TaskOptions:
-    """Options for when a new task runs, and whether the command waits for it."""
+    """Options for how a new task is submitted, and whether the command waits for it."""
 
-    priority: Annotated[
-        int, typer.Option(metavar="0..10", help="Priority of the task; 10 is the highest.")
-    ] = PRIORITY
-    after: Annotated[
-        int, typer.Option(metavar="ID", help="Run after this task has completed; 0: none.")
-    ] = 0
-    start_in: StartIn = ""
-    start_at: StartAt = ""
-    every: Every = ""
-    deadline: Deadline = ""
     nonce: Annotated[
         int,
         typer.Option(
@@ -151,36 +111,4 @@ class TaskOptions:
             help="Idempotency key: submissions with the same number make one task; 0: random.",
         ),
     ] = 0
-    label: Annotated[
-        str, typer.Option(metavar="TEXT", help="Name of the task, at most 24 bytes of UTF-8.")
-    ] = ""
     wait: Wait = False
-
-
-def start_of(start_in: str, start_at: str) -> tuple[float | None, datetime | None]:
-    """Return the delay, s, of ``--in``, and the time of ``--at``; None: not given.
-
-    Raise UsageError if one is invalid, or if both are given.
-    """
-    if start_in and start_at:
-        raise UsageError("--in and --at: choose one of them")
-    if not start_at:
-        return seconds_of("--in", start_in), None
-    return None, parse_moment("--at", start_at, now=datetime.now(UTC))
-
-
-def every_of(text: str) -> float | str:
-    """Return the argument ``every`` of the library for ``--every``; 0: not given, or "never".
-
-    Raise UsageError for an invalid duration; the library checks the rest.
-    """
-    if text in ("", NEVER):
-        return 0.0
-    return text if len(text.split()) > 1 else parse_duration("--every", text)
-
-
-def seconds_of(name: str, text: str) -> float | None:
-    """Return the parsed duration of an option, s; None if it is not given."""
-    if not text:
-        return None
-    return parse_duration(name, text)

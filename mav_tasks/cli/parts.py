@@ -22,8 +22,12 @@ METAVARS = {
 SECONDS = "s"
 
 
-def parameter_of(part: Part) -> Parameter:
-    """Return the argument or option of a part, whose value is a text, or an option without one."""
+def parameter_of(part: Part, *, key: str = "", metavar: str | None = None) -> Parameter:
+    """Return the argument or option of a part, whose value is a text, or an option without one.
+
+    ``key``: name of the parameter, if it is not that of the part.
+    """
+    key = key or part.name
     words = part.meaning[:1].upper() + part.meaning[1:]
     words += ", for example 30s or 5m" if part.shape.unit == SECONDS else ""
     names = getattr(part.shape, "words", ())
@@ -33,8 +37,8 @@ def parameter_of(part: Part) -> Parameter:
         names_of_both = f"{name}/--no-{name.removeprefix('--')}"
         flag = Annotated[bool | None, typer.Option(names_of_both, help=f"{words}.")]
         default = Parameter.empty if part.is_required else None
-        return Parameter(part.name, Parameter.KEYWORD_ONLY, default=default, annotation=flag)
-    more: dict[str, Any] = {"metavar": _metavar(part), "help": f"{words}."}
+        return Parameter(key, Parameter.KEYWORD_ONLY, default=default, annotation=flag)
+    more: dict[str, Any] = {"metavar": metavar or _metavar(part), "help": f"{words}."}
     if names:
         more["autocompletion"] = completing(names)
     if part.is_required:
@@ -42,7 +46,7 @@ def parameter_of(part: Part) -> Parameter:
     else:
         option = typer.Option(name, **more)
         kind, default = Annotated[str | None, option], None
-    return Parameter(part.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+    return Parameter(key, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 
 def _metavar(part: Part) -> str:

@@ -12,8 +12,9 @@ from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import AnyCommon, Common, TaskOptions, Wait
-from mav_tasks.cli.session import ChoiceHeard, opened, read, rover_of, values_checked
+from mav_tasks.cli.session import ChoiceHeard, opened, rover_of, values_checked
 from mav_tasks.cli.submit import tell_submitted
+from mav_tasks.cli.terms import TaskTerms
 from mav_tasks.plans import PlanFile, format_plan, read_plan, write_plan
 from mav_tasks.tasks.task import ANY
 
@@ -44,15 +45,16 @@ rally = group("Upload and clear rally points.")
 @command
 async def upload_mission(
     file: FileIn,
-    terms: TaskOptions,
+    terms: TaskTerms,
+    options: TaskOptions,
     common: AnyCommon,
     stage: Annotated[
         bool, typer.Option("--stage", help="Do not queue it; start it later with 'mission start'.")
     ] = False,
 ) -> None:
     """Upload a mission and queue it as one task."""
-    wished = read(terms)
-    if stage and terms != TaskOptions(wait=terms.wait):
+    wished = terms.read()
+    if stage and (wished or options.nonce):
         raise UsageError(
             "--stage: only --wait goes with it; a staged mission takes no other task option"
         )
@@ -64,9 +66,11 @@ async def upload_mission(
             if stage:
                 task = await client.stage_mission(plan)
             else:
-                task = await client.submit_mission(plan, vehicle=rover_of(common), **wished)
+                task = await client.submit_mission(
+                    plan, vehicle=rover_of(common), nonce=options.nonce, **wished
+                )
         hint = " waits: mav-tasks mission start" if stage else heard.hint(task)
-        await tell_submitted(client, task, common, is_awaited=terms.wait, hint=hint)
+        await tell_submitted(client, task, common, is_awaited=options.wait, hint=hint)
 
 
 @mission.command("start")

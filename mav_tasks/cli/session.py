@@ -2,11 +2,11 @@
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from typing import Any, Literal
+from typing import Literal
 
 from mav_tasks.basics.errors import LinkDown, NoAnswer, UsageError
 from mav_tasks.cli import output
-from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_of, start_of
+from mav_tasks.cli.options import Common, Reach
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import News, QueueStatus, Text
@@ -15,15 +15,6 @@ from mav_tasks.tasks.task import ANY
 
 NO_ROVER = "has heard no rover"  # of an answer (``client/fleet_view.py``)
 CHOSEN = " chosen: "  # in the text of a new task (``engine/commands/submissions.py``)
-
-
-def read(terms: TaskOptions) -> dict[str, Any]:
-    """Return the arguments of ``Client.submit`` for a task. Raise UsageError if one is invalid."""
-    delay, at = start_of(terms.start_in, terms.start_at)
-    deadline = seconds_of("--deadline", terms.deadline) or 0.0
-    shared = {name: getattr(terms, name) for name in ("priority", "after", "nonce", "label")}
-    every = every_of(terms.every)
-    return {"delay": delay or 0.0, "at": at, "every": every, "deadline": deadline, **shared}
 
 
 @asynccontextmanager

@@ -14,7 +14,8 @@ from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import AnyCommon, Common, TaskOptions
 from mav_tasks.cli.parts import parameter_of, value_of
 from mav_tasks.cli.places import parse_place
-from mav_tasks.cli.session import ChoiceHeard, is_alone, opened, read, rover_of, values_checked
+from mav_tasks.cli.session import ChoiceHeard, is_alone, opened, rover_of, values_checked
+from mav_tasks.cli.terms import TaskTerms
 from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
@@ -45,7 +46,8 @@ async def goto(
     east: Annotated[
         str, typer.Argument(metavar="EAST|LON", help="Metres, or degrees with --global.")
     ],
-    terms: TaskOptions,
+    terms: TaskTerms,
+    options: TaskOptions,
     common: AnyCommon,
     is_global: Annotated[
         bool, typer.Option("--global", help="The numbers are latitude and longitude.")
@@ -69,16 +71,18 @@ async def goto(
     """
     place = parse_place(north, east, is_global=is_global, is_local=is_local)
     way = GoTo(place, speed=speed, radius=radius, yaw=_maybe_radians(heading))
-    await _submit([way], terms, common)
+    await _submit([way], terms, options, common)
 
 
 def _add(form: Form) -> None:
     """Add the command of a kind: its required parts are arguments, the others options."""
 
-    async def submit(terms: TaskOptions, common: AnyCommon, **given: str | None) -> None:
+    async def submit(
+        terms: TaskTerms, options: TaskOptions, common: AnyCommon, **given: str | None
+    ) -> None:
         pairs = ((part, given[part.name]) for part in form.numbers)
         parts = {part.name: value_of(part, text) for part, text in pairs if text is not None}
-        await _submit(made_of(form, parts), terms, common)
+        await _submit(made_of(form, parts), terms, options, common)
 
     shared = [Parameter(n, Parameter.KEYWORD_ONLY, annotation=a) for n, a in SHARED.items()]
     submit.__signature__ = Signature([*map(parameter_of, form.numbers), *shared])  # type: ignore[attr-defined]
@@ -87,7 +91,7 @@ def _add(form: Form) -> None:
     add(command(submit))
 
 
-SHARED = {"terms": TaskOptions, "common": AnyCommon}
+SHARED = {"terms": TaskTerms, "options": TaskOptions, "common": AnyCommon}
 
 
 for each in FORMS:
@@ -97,14 +101,18 @@ for each in FORMS:
         _add(each)
 
 
-async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> None:
+async def _submit(
+    goals: Sequence[Goal], terms: TaskTerms, options: TaskOptions, common: Common
+) -> None:
     output.warn(PLUGGED.broken)
-    wished, heard = read(terms), ChoiceHeard()
+    wished, heard = terms.read(), ChoiceHeard()
     async with opened(common) as client:
         with values_checked(), in_typed_words(), client.listening(heard.listen):
-            task = await client.submit(goals, vehicle=rover_of(common), **wished)
+            task = await client.submit(
+                goals, vehicle=rover_of(common), nonce=options.nonce, **wished
+            )
         hint = heard.hint(task)
-        await tell_submitted(client, task, common, is_awaited=terms.wait, hint=hint)
+        await tell_submitted(client, task, common, is_awaited=options.wait, hint=hint)
 
 
 async def tell_submitted(

@@ -4,11 +4,11 @@ import re
 from datetime import datetime, time, timedelta, tzinfo
 
 from mav_tasks.basics.errors import UsageError
+from mav_tasks.tasks.task import MAX_DELAY
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 DURATION = re.compile(rf"(?:{_NUMBER}d)?(?:{_NUMBER}h)?(?:{_NUMBER}m)?(?:{_NUMBER}s?)?", re.ASCII)
 UNITS = (86_400.0, 3600.0, 60.0, 1.0)  # s, of the four groups
-LONGEST = 366 * 86_400.0  # s
 
 
 def parse_duration(name: str, text: str) -> float:
@@ -18,7 +18,7 @@ def parse_duration(name: str, text: str) -> float:
         raise UsageError(f"{name} {text}: expected a duration such as 30s, 5m or 1h30m")
     parts = zip(match.groups(), UNITS, strict=True)
     seconds = sum(float(number) * unit for number, unit in parts if number)
-    if seconds > LONGEST:
+    if seconds > MAX_DELAY:
         raise UsageError(f"{name} {text}: more than a year")
     return seconds
 
@@ -27,7 +27,7 @@ def parse_moment(name: str, text: str, *, now: datetime, zone: tzinfo | None = N
     """Return the moment of "2026-11-20T14:30", or the next "14:30"; ``now`` has a time zone.
 
     Without a zone in the text ("…Z", "…+01:00") it is local time of ``zone``; None: the system's.
-    Raise UsageError if invalid, past, or more than 366 days ahead.
+    Raise UsageError if invalid, past, or more than a year ahead.
     """
     # the standard library would also accept a date, "14" or "1430": none is clearly a time
     moment = (_next(text, now, zone) or _dated(text, zone)) if ":" in text else None
@@ -35,7 +35,7 @@ def parse_moment(name: str, text: str, *, now: datetime, zone: tzinfo | None = N
         raise UsageError(f"{name} {text}: expected a time such as 14:30 or 2026-11-20T14:30")
     if moment <= now:
         raise UsageError(f"{name} {text}: that time is in the past")
-    if (moment - now).total_seconds() > LONGEST:
+    if (moment - now).total_seconds() > MAX_DELAY:
         raise UsageError(f"{name} {text}: more than a year ahead")
     return moment
 

@@ -35,8 +35,6 @@ TYPED = {
     "duration": Typed("DURATION", "s", "driving.max_duration"),
     "hold": Typed("DURATION", "s"),
     "acceptance radius": Typed("--radius", "m"),
-    "start delay": Typed("--in", "s"),
-    "priority": Typed("--priority"),
 }
 
 

@@ -20,7 +20,7 @@ from mav_tasks.client.plan_sources import Plan, file_of, items_of
 from mav_tasks.client.session import TELEMETRY_RATE, Session
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.client.submissions import Submissions, utc_of
-from mav_tasks.client.terms import AnyRover, Changes, Numbered, Terms, id_of
+from mav_tasks.client.terms import NOT_NUMBERS, PROPERTIES, AnyRover, Changes, Terms, given, id_of
 from mav_tasks.client.values import (
     News,
     QueueStatus,
@@ -53,7 +53,7 @@ from mav_tasks.plans import (
     rally_items,
 )
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason
-from mav_tasks.tasks.task import DEFAULT_PRIORITY
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_DELAY
 
 DEFAULT_LINK = "udpout:127.0.0.1:14560"
 #: not 255, so that a ground station and a script on one link differ
@@ -61,8 +61,8 @@ SCRIPT = Address(244, 190)
 FIND_WITHIN = 5.0  # s
 STOP_AGAIN = 0.1  # s between copies of a STOP
 STOP_WITHIN = 3.0  # s
-#: s, a year: the first run of a cron expression waits so long, until the server knows that
-UNTIL_REPEATED = 31_536_000.0
+#: the first run of a cron expression waits so long, until the server knows that
+UNTIL_REPEATED = MAX_DELAY
 KILL = 1.0  # param2 of TASK_CANCEL
 RESUME = 1.0  # param1 of DO_PAUSE_CONTINUE
 EPOCHS = 1 << 24  # integers that a float32 holds exactly
@@ -70,16 +70,6 @@ PAGE = 16  # tasks that one request returns
 NO_HISTORY = "the server does not list finished tasks: it is older than this client"
 OVERTAKEN = "a later STOP or pause overtook this request: repeat it if you still mean it"
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
-#: what is changed by a number, in the order in which it is sent
-PROPERTIES = {
-    "priority": TaskProperty.PRIORITY,
-    "deadline": TaskProperty.DEADLINE,
-    "after": TaskProperty.RUN_AFTER,
-    "before": TaskProperty.RUN_BEFORE,
-    "preemptible": TaskProperty.PREEMPTIBLE,
-    "preemptive": TaskProperty.PREEMPTIVE,
-    "delay": TaskProperty.START_DELAY,
-}
 
 
 class Client:
@@ -197,8 +187,7 @@ class Client:
     async def submit(self, goal: Goal | Sequence[Goal], **terms: Unpack[Terms]) -> Task:
         """Submit a goal, or several goals in order as one task. Return once the task is durable.
 
-        ``terms``: priority, after, delay, deadline, at, vehicle, nonce, label, every; what they
-        mean says ``mav_tasks.client.terms.Terms``.
+        What ``terms`` there are, and mean, says ``mav_tasks.client.terms.Terms``.
         """
         goals = goal if isinstance(goal, Sequence) and not isinstance(goal, str) else (goal,)
         if not goals:
@@ -263,30 +252,27 @@ class Client:
     ) -> None:
         """Change a task that has not ended.
 
-        ``changes``: priority, delay, deadline, after, before, preemptible, preemptive, at, label,
-        every; what they mean says ``mav_tasks.client.terms.Changes``.
+        What ``changes`` there are, and mean, says ``mav_tasks.client.terms.Changes``.
         """
-        if unknown := changes.keys() - Changes.__annotations__.keys():
-            raise TypeError(f"modify takes no argument {', '.join(sorted(unknown))}")
-        every, at, label = changes.get("every"), changes.get("at"), changes.get("label")
-        if every is not None:
+        terms = given(changes)
+        if (every := terms.get("every")) is not None:
             await self._set_repeat(task_id, wire.repeat_of(every), vehicle=vehicle)
-        given: dict[str, Any] = {**changes}
         numbers = {
             name: to_param(id_of(value)) if name in ("after", "before") else float(value)
-            for name, value in given.items()
-            if name in PROPERTIES and value is not None
+            for name, value in terms.items()
+            if name not in NOT_NUMBERS
         }
         for name in ("deadline", "delay"):
             check_size(name, numbers.get(name, 0.0))
-        for name in filter(numbers.__contains__, PROPERTIES):
+        # the delay last, as it may let the task start; a priority before a place: it ends one
+        for name in sorted(filter(numbers.__contains__, PROPERTIES), key="delay".__eq__):
             params = to_param(task_id), float(PROPERTIES[name]), numbers[name]
             await self._control(vehicle, MavCmd.TASK_MODIFY, *params)
-        if at is not None:
+        if (at := terms.get("at")) is not None:
             await self._modify_exactly(
                 task_id, TaskProperty.START_UTC, round(utc_of(at)), 0, nan, vehicle=vehicle
             )
-        if label is not None:
+        if (label := terms.get("label")) is not None:
             check_label(label)
             await self._write(
                 task_id, TaskProperty.LABEL, label, lambda status: status.label, vehicle=vehicle
@@ -703,32 +689,34 @@ class Client:
         plan: Plan,
         command: Move | Rotate | Drive | None,
         *,
-        priority: int = DEFAULT_PRIORITY,
-        after: int | Numbered = 0,
-        delay: float = 0.0,
-        deadline: float = 0.0,
-        at: datetime | None = None,
         vehicle: int | AnyRover | None = None,
         nonce: int = 0,
         check: int = 0,
-        label: str = "",
-        every: float | str = 0.0,
+        **terms: Unpack[Changes],
     ) -> Task:
         """Submit a plan; ``command``: its only goal, if that is sent as a command."""
-        check_label(label)
-        repeat = _repeat_of(every, delay, at)
+        rest = given(terms)
+        check_label(rest.get("label", ""))
+        delay, at = rest.pop("delay", 0.0), rest.get("at")
+        repeat = _repeat_of(rest.pop("every", 0.0), delay, at)
         target = self._task_server(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
-        within = 0.0 if repeat else deadline  # else counted from each start, and set afterwards
-        options = TaskOptions(priority, id_of(after), wait, within)
+        # of a task that repeats, it is counted from each start, and set afterwards
+        within = 0.0 if repeat else rest.get("deadline", 0.0)
+        first = rest.pop("priority", DEFAULT_PRIORITY), id_of(rest.pop("after", 0))
+        options = TaskOptions(*first, wait, within)
         if command is not None:
             task = await self._submit_command(command, options, target, mark)
         else:
             items = (*items_of(plan), wire.options_of(options, nonce=mark, check=check))
             task = await self._submit_plan(items, target, mark)
-            deadline -= within  # which its options carried
-        await self._complete(task, repeat=repeat, deadline=deadline, at=at, label=label, nonce=mark)
+            if within:
+                del rest["deadline"]  # which its options carried
+        for name in ("deadline", "label"):
+            if not rest.get(name):
+                rest.pop(name, None)  # as a new task is
+        await self._complete(task, repeat, rest, nonce=mark)
         return task
 
     async def _submit_command(
@@ -784,28 +772,16 @@ class Client:
         assert view.server_component is not None, "the same"
         return Address(system_id, view.server_component)
 
-    async def _complete(
-        self,
-        task: Task,
-        *,
-        repeat: str,
-        deadline: float,
-        at: datetime | None,
-        label: str,
-        nonce: int,
-    ) -> None:
-        """Set the properties that the submission could not carry."""
+    async def _complete(self, task: Task, repeat: str, rest: dict[str, Any], *, nonce: int) -> None:
+        """Set the terms that the submission could not carry."""
         try:
             if repeat:
                 await self._repeat(task, repeat)
-            if at is not None:
-                await task.modify(at=at)
-            if deadline:
-                with _in_any_state():  # it may have started in time already
-                    await task.modify(deadline=deadline)
-            if label:
-                with _in_any_state():  # it may have ended already
-                    await task.modify(label=label)
+            if "at" in rest:
+                await task.modify(at=rest.pop("at"))
+            for name, value in rest.items():
+                with _in_any_state():  # it may have started in time, or ended, already
+                    await task.modify(**{name: value})
         except NoAnswer as error:  # the task exists: a second try needs its nonce
             raise NoAnswer(str(error), nonce=nonce) from None
 

@@ -2,13 +2,15 @@
 
 A nonce has 30 bits, and all clients of one MAVLink address and key share them. With 1,000 tasks
 remembered, a new key meets the nonce of another one once in a million submissions. So 31 more bits
-of the key, with the label, go into the plan: the server compares them with the rest of the plan,
-and refuses a key that only looks like another one. It never takes one task for the other.
+of the key, with the terms of the task, go into the plan: the server compares them with the
+rest of it, and refuses a key that only looks like another one. It never takes one task for the
+other.
 """
 
 from hashlib import sha256
 from typing import NamedTuple
 
+from mav_tasks.client.terms import Changes
 from mav_tasks.kinds.sent import LARGEST
 from mav_tasks.tasks.task import MAX_NONCE
 
@@ -22,11 +24,12 @@ class Numbers(NamedTuple):
     check: int
 
 
-def numbers_of(key: str, *, label: str) -> Numbers:
-    """Return the numbers of a key; the check depends on the label, too.
+def numbers_of(key: str, terms: Changes) -> Numbers:
+    """Return the numbers of a key; the check depends on the terms, too.
 
-    The server sets a label after the submission, and does not compare it itself.
+    Some are set after the submission: the server does not compare these itself.
     """
+    rest = [f"{name} {value}" for name, value in sorted(terms.items())]
     nonce = int.from_bytes(sha256(key.encode()).digest()[:16]) % MAX_NONCE + 1
-    whole = sha256(f"{len(key)} {key} {label}".encode()).digest()
+    whole = sha256("\0".join([f"{len(key)} {key}", *rest]).encode()).digest()
     return Numbers(nonce, int.from_bytes(whole[:16]) % LARGEST + 1)

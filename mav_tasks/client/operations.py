@@ -14,7 +14,8 @@ from typing import NamedTuple
 class Operation(NamedTuple):
     """``about``: what it is asked of, "rover", "task" or "all".
 
-    ``parts``: names in ``parts.OF_OPERATIONS``. Those that are required there are needed over HTTP
+    ``parts``: names in ``parts.OF_OPERATIONS``, and all terms of a task (``terms``) if it
+    ``has_terms``. Those that are required there are needed over HTTP
     and in tools, whose callers do not see what they let go; people need not name them. A tool has
     no others: each word costs an agent.
     ``advice``: what an agent must know besides. ``no_tool``: why agents do not have it.
@@ -30,12 +31,8 @@ class Operation(NamedTuple):
     no_tool: str = ""
     done: str = "done"
     is_halt: bool = False
+    has_terms: bool = False
     by_hand: Mapping[str, str] = MappingProxyType({})
-
-    @property
-    def names(self) -> list[str]:
-        """The names of its parts."""
-        return self.parts.split()
 
 
 OPERATIONS = (
@@ -93,7 +90,7 @@ OPERATIONS = (
         "modify",
         "task",
         "Change a task that has not ended",
-        "priority after before delay at deadline label every cron preemptible preemptive",
+        has_terms=True,
         no_tool="an agent cancels its task and submits another one",
         by_hand={
             "command": "reads times and periods as people write them",

@@ -143,8 +143,7 @@ class SyncClient(BlockingClient):
     def submit(self, goal: Goal | Sequence[Goal], **terms: Unpack[Terms]) -> SyncTask:
         """Submit a goal, or several goals in order as one task. Return once the task is durable.
 
-        ``terms``: priority, after, delay, deadline, at, vehicle, nonce, label, every; what they
-        mean says ``mav_tasks.client.terms.Terms``.
+        What ``terms`` there are, and mean, says ``mav_tasks.client.terms.Terms``.
         """
         return self._handle(SyncTask, self._aio.submit(goal, **terms))
 
@@ -199,8 +198,7 @@ class SyncClient(BlockingClient):
     ) -> None:
         """Change a task that has not ended.
 
-        ``changes``: priority, delay, deadline, after, before, preemptible, preemptive, at, label,
-        every; what they mean says ``mav_tasks.client.terms.Changes``.
+        What ``changes`` there are, and mean, says ``mav_tasks.client.terms.Changes``.
         """
         self._call(self._aio.modify(task_id, vehicle=vehicle, **changes))
 

@@ -19,8 +19,9 @@ from mav_tasks.kinds.form import Form
 GROUP = "mav_tasks.kinds"
 #: names of options that each submission has on the command line
 TAKEN = (
-    *("kind", "priority", "after", "start_in", "start_at", "every", "deadline", "nonce", "label"),
-    *("wait", "server", "vehicle", "timeout", "sign", "keys", "json", "help", "terms", "common"),
+    *("priority", "after", "before", "delay", "at", "deadline", "label", "every", "preemptible"),
+    *("preemptive", "nonce", "wait", "server", "vehicle", "timeout", "sign", "keys", "json"),
+    *("kind", "help", "terms", "options", "common"),
 )
 
 

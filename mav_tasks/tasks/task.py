@@ -23,6 +23,7 @@ def following(task_id: int) -> TaskId:
 
 DEFAULT_PRIORITY = 5
 MAX_PRIORITY = 10  # 10 runs first
+MAX_DELAY = 31_536_000.0  # s, a year, until a task starts, or expires
 
 #: degE7, 0.1 m: an origin computed from positions varies by 1 each time (ArduPilot 4.6.3)
 SAME_ORIGIN = 10

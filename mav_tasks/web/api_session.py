@@ -4,11 +4,13 @@ import time
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, suppress
 from importlib.metadata import version
+from typing import Any
 
 from starlette.responses import Response, StreamingResponse
 
 from mav_tasks.basics.errors import UsageError
 from mav_tasks.client.parts import KEY_TEXT
+from mav_tasks.client.terms import PARTS
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Text
 from mav_tasks.kinds.in_json import FORMS
@@ -47,21 +49,11 @@ def operations(services: Services) -> list[Operation]:
                     "kind": kind.name,
                     "title": kind.title,
                     "meaning": kind.meaning,
-                    "numbers": [
-                        {
-                            "name": number.name,
-                            "unit": number.shape.unit,
-                            "meaning": number.meaning,
-                            "required": number.is_required,
-                            "least": number.schema.get("minimum"),
-                            "most": number.schema.get("maximum"),
-                            "words": list(getattr(number.shape, "words", ())),
-                        }
-                        for number in kind.numbers
-                    ],
+                    "numbers": [_part(number) for number in kind.numbers],
                 }
                 for kind in FORMS
             ],
+            "terms": [_part(part) for part in PARTS],
             "priority": {"least": 0, "most": MAX_PRIORITY, "default": DEFAULT_PRIORITY},
             "label_bytes": MAX_LABEL,
         }
@@ -116,6 +108,20 @@ def operations(services: Services) -> list[Operation]:
             description=description(),
         ),
     ]
+
+
+def _part(part: Part) -> dict[str, Any]:
+    schema = part.schema
+    return {
+        "name": part.name,
+        "type": schema.get("type", "any"),
+        "unit": part.shape.unit,
+        "meaning": part.meaning,
+        "required": part.is_required,
+        "least": schema.get("minimum"),
+        "most": schema.get("maximum", schema.get("maxLength")),
+        "words": list(getattr(part.shape, "words", ())),
+    }
 
 
 async def _while_it_may(

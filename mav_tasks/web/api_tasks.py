@@ -11,14 +11,14 @@ from mav_tasks.client.parts import (
     KEY_TEXT,
 )
 from mav_tasks.client.plan_sources import Plan
-from mav_tasks.client.terms import AnyRover
+from mav_tasks.client.terms import PARTS, AnyRover
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.kinds.in_json import goals_of
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.plan_text import NAME, text_part
 from mav_tasks.web.services import Services
-from mav_tasks.web.submissions import KEY, TERMS, submit
+from mav_tasks.web.submissions import KEY, submit
 
 FILE = (NAME, text_part("contents of a .plan or QGC WPL 110 file"))
 KEYED = (Part(KEY, KEY_TEXT, "a text of yours: the same key makes no second task"),)
@@ -87,7 +87,7 @@ def operations(services: Services) -> list[Operation]:
             f"/vehicles/{rover}/{name}",
             f"Submit {what} as one task{whose}",
             asks(handler),
-            body=[*body, *TERMS],
+            body=[*body, *PARTS],
             reading=reading,
             answer="Task",
             status=201,

@@ -119,26 +119,19 @@ POINT: Schema = {
     "minItems": 5,
     "maxItems": 5,
 }
-KIND = whole(
+PART = whole(
     {
-        "kind": TEXT,
-        "title": TEXT,
+        "name": TEXT,
+        "type": said(TEXT, "as in a JSON schema"),
+        "unit": TEXT,
         "meaning": TEXT,
-        "numbers": listed(
-            whole(
-                {
-                    "name": TEXT,
-                    "unit": TEXT,
-                    "meaning": TEXT,
-                    "required": FLAG,
-                    "least": MAYBE,
-                    "most": MAYBE,
-                    "words": listed(TEXT),
-                }
-            )
-        ),
+        "required": FLAG,
+        "least": MAYBE,
+        "most": MAYBE,
+        "words": said(listed(TEXT), "what it may be; none: anything of its type"),
     }
 )
+KIND = whole({"kind": TEXT, "title": TEXT, "meaning": TEXT, "numbers": listed(ref("Part"))})
 
 SCHEMAS: dict[str, Schema] = {
     "Place": PLACE,
@@ -281,12 +274,14 @@ SCHEMAS: dict[str, Schema] = {
             "journal": FLAG,
             "records": FLAG,
             "goals": listed(ref("Kind")),
+            "terms": said(listed(ref("Part")), "what can be said of when and how a task runs"),
             "priority": whole({"least": INTEGER, "most": INTEGER, "default": INTEGER}),
             "label_bytes": INTEGER,
         }
     ),
     "Tiles": whole({"url": TEXT, "attribution": TEXT, "min_zoom": INTEGER, "max_zoom": INTEGER}),
     "Kind": KIND,
+    "Part": PART,
     "Problem": whole(
         {
             "type": TEXT,

@@ -171,8 +171,8 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert [(task["id"], task["priority"]) for task in queue["waiting"]] == [(waiting["id"], 9)]
 
     (later,) = called("submit", "move", "1", "--json", server=server).objects
-    (last,) = called("submit", "move", "1", "--json", server=server).objects
-    called("modify", str(last["id"]), "--before", str(later["id"]), server=server)
+    before = ("--before", str(later["id"]), "--json")
+    (last,) = called("submit", "move", "1", *before, server=server).objects
     (queue,) = called("queue", "--json", server=server).objects
     assert [task["id"] for task in queue["waiting"]][:2] == [last["id"], later["id"]]
     for each in (last, later):

@@ -8,8 +8,8 @@ from unittest.mock import MagicMock
 
 from mav_tasks.agents.driving import driving
 from mav_tasks.cli.commands import COMMANDS
+from mav_tasks.client.asking import parts_of
 from mav_tasks.client.operations import OPERATIONS
-from mav_tasks.client.parts import OF_OPERATIONS
 from mav_tasks.web.application import operations_of
 from mav_tasks.web.openapi import document_of
 
@@ -26,6 +26,8 @@ METHOD = """    async def honk(
         await self._control(vehicle, MavCmd.DO_SET_RELAY, float(priority), float(kill))
 
     async def pause("""
+TERM = """    urgency: Annotated[int | None, Number(0, 9), "how urgent", TaskProperty.PRIORITY]
+    preemptible: Annotated["""
 SCRIPT = """
 from unittest.mock import MagicMock
 from mav_tasks import __file__ as where
@@ -42,7 +44,11 @@ assert schema["properties"]["priority"]["maximum"] == 10, schema
 (tool,) = (each for each in driving("") if each.name == "honk")
 assert (tool.title, tool.about) == ("Sound the horn", "Sound the horn. Ask first.")
 assert SyncClient.honk
-for arguments in (["--help"], ["honk", "--help"], ["honk", "--priority", "11"]):
+changed = [["modify", "3", "--urgency", "11"], ["submit", "wait", "1", "--urgency", "x"]]
+for path, verb in (("/tasks/{{task}}", "patch"), ("/vehicles/any/tasks", "post")):
+    body = document_of(operations_of(MagicMock()))["paths"][path][verb]["requestBody"]
+    assert "urgency" in body["content"]["application/json"]["schema"]["properties"]
+for arguments in (["--help"], ["honk", "--help"], ["honk", "--priority", "11"], *changed):
     try:
         app(arguments, prog_name="mav-tasks")
     except SystemExit:
@@ -61,12 +67,13 @@ def test_each_surface_has_each_operation_or_a_reason() -> None:
         verbs = paths[route.removesuffix("/modify") if each.name in WITHOUT else route]
         body = verbs["patch" if each.name in WITHOUT else "post"]["requestBody"]
         properties = body["content"]["application/json"]["schema"]["properties"]
-        assert properties.keys() - {"vehicle"} == set(each.names), each.name
+        parts = parts_of(each)
+        assert properties.keys() - {"vehicle"} == {part.name for part in parts}, each.name
         assert commands[each.name].help == f"{each.summary}."
         if each.no_tool:
             assert each.name not in tools
             continue
-        required = {name for name in each.names if OF_OPERATIONS[name].is_required}
+        required = {part.name for part in parts if part.is_required}
         arguments = {part.name: part.schema for part in tools[each.name].arguments}
         assert arguments.keys() - {"vehicle", "id"} == required
         assert {name: arguments[name] for name in required} == {
@@ -74,13 +81,14 @@ def test_each_surface_has_each_operation_or_a_reason() -> None:
         }
 
 
-def test_a_new_operation_is_one_row_and_the_method_that_does_it(tmp_path: Path) -> None:
+def test_a_new_operation_is_one_row_and_its_method_and_a_new_term_one_line(tmp_path: Path) -> None:
     copy = tmp_path / "mav_tasks"
     for name in ("mav_tasks", "tools"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name, before, after in (
         ("operations.py", "OPERATIONS = (\n", ROW),
         ("aio.py", "    async def pause(", METHOD),
+        ("terms.py", "    preemptible: Annotated[", TERM),
     ):
         path = copy / "client" / name
         text = path.read_text(encoding="utf-8")
@@ -101,5 +109,6 @@ def test_a_new_operation_is_one_row_and_the_method_that_does_it(tmp_path: Path) 
         assert ran.returncode == 0, ran.stderr
         said = " ".join(ran.stdout.split())
     assert "honk Sound the horn." in said
-    assert "--priority PRIORITY 10 runs first; 5 if not given. --kill" in said
-    assert "priority 11: not in 0..10" in said
+    assert "--priority PRIORITY 10 runs first; a new task has 5. --kill" in said
+    for words in ("priority 11: not in 0..10", "--urgency 11: not in 0..9", "--urgency 'x': not a"):
+        assert words in said

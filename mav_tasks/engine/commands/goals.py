@@ -17,11 +17,10 @@ from mav_tasks.kinds import SingleGoal
 from mav_tasks.kinds.commands import PARSERS
 from mav_tasks.kinds.params import KNOWN_FRAMES, identifier, number, refuse_infinite, whole
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, Marks, Terms
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_DELAY, MAX_PRIORITY, Marks, Terms
 
 R = TaskReason
 
-MAX_DELAY = 31_536_000.0  # s, a year
 
 _MARK = Struct("<BBHh7d")
 

@@ -10,7 +10,6 @@ from mav_tasks.basics.latest import keep_latest
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.command_request import CommandRequest
-from mav_tasks.engine.commands.goals import MAX_DELAY
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.services.commands import COPIED, REPEATED, Command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -23,7 +22,7 @@ from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, canonical, repeating
-from mav_tasks.tasks.task import MAX_PRIORITY, Task, TaskId, Terms
+from mav_tasks.tasks.task import MAX_DELAY, MAX_PRIORITY, Task, TaskId, Terms
 from mav_tasks.tasks.times import Times
 
 R, P = TaskReason, TaskProperty

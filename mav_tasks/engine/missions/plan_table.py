@@ -14,7 +14,7 @@ from typing import NamedTuple
 from mav_tasks.basics.errors import Rejection
 from mav_tasks.config.settings import Driving
 from mav_tasks.engine.commands.ability import ability_of
-from mav_tasks.engine.commands.goals import MAX_DELAY, goal_of
+from mav_tasks.engine.commands.goals import goal_of
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.engine.services.commands import NO_MESSAGE, Command
 from mav_tasks.engine.services.missions import NOT_GIVEN
@@ -27,7 +27,7 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
 from mav_tasks.tasks.goal import Delay, Jump, Near, Nothing, Perform, SetReverse, SetSpeed, Step
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, Terms
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_DELAY, MAX_PRIORITY, Terms
 
 R = TaskReason
 

@@ -5,6 +5,7 @@ import { consequenceOf, may } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { failureLine, h } from "./dom.js";
 import { loadGround, preview } from "./map.js";
+import { fieldsOf, filledIn } from "./parts.js";
 import { state } from "./store.js";
 
 const LARGEST = 10_000_000; // characters; the server's own limit
@@ -61,16 +62,15 @@ async function open(file) {
   };
   extra("fence", `its fence (${counted(plan.fence.length, "shape")})`, plan.fence.length, "It replaces the present fence; a driving rover stops at it.");
   extra("rally", `its rally points (${plan.rally.length})`, plan.rally.length, "They replace the present ones.");
-  const terms = h("div", { class: "fields" }, h("label", {}, "Name of the task", h("input", { name: "label", maxLength: state.session.label_bytes, value: shortened(file.name) })),
-    h("label", {}, "Priority", h("input", { name: "priority", type: "number", min: state.session.priority.least, max: state.session.priority.most, value: state.session.priority.default })));
+  const terms = ["label", "priority"].map(termOf);
   const form = ask({
     title: plan.items ? `Queue this plan for rover ${vehicle}?` : `Set this for rover ${vehicle}?`, words, word: plan.items ? "Queue the plan" : "Set it", isBeside: true,
-    fields: h("div", {}, ...parts, plan.items ? terms : null),
+    fields: h("div", {}, ...parts, plan.items ? h("div", { class: "fields" }, ...fieldsOf(terms, { label: shortened(file.name) })) : null),
     act: async (filled) => {
       const data = new FormData(filled);
       const body = { name: file.name, text };
       for (const part of ["fence", "rally"]) if (data.get(part)) await request("PUT", `/vehicles/${vehicle}/${part}`, body);
-      if (plan.items) await post(`/vehicles/${vehicle}/missions`, { ...body, label: String(data.get("label")), priority: Number(data.get("priority")) }, { key });
+      if (plan.items) await post(`/vehicles/${vehicle}/missions`, { ...body, ...filledIn(filled, terms) }, { key });
       loadGround();
     },
     onClose: () => preview(null),
@@ -82,9 +82,11 @@ async function open(file) {
 
 const counted = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;
 
-// a label has at most 24 bytes of UTF-8
+const termOf = (name) => state.session.terms.find((term) => term.name === name);
+
+// a label has few bytes of UTF-8
 function shortened(name) {
   let text = name.replace(/\.[^.]*$/, "");
-  while (new TextEncoder().encode(text).length > state.session.label_bytes) text = [...text].slice(0, -1).join("");
+  while (new TextEncoder().encode(text).length > termOf("label").most) text = [...text].slice(0, -1).join("");
   return text;
 }

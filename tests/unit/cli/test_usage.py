@@ -21,7 +21,7 @@ DURATION, MOMENT = "30s, 5m or 1h30m", "14:30"
 
 #: options of a submission -> what is said of them; "": they are understood
 DURATIONS = {
-    **dict.fromkeys(("30s", "30", "0", "0.5s", "1.5h", "1h5", "2d1h1m1s", " 5M ", "366d"), ""),
+    **dict.fromkeys(("30s", "30", "0", "0.5s", "1.5h", "1h5", "2d1h1m1s", " 5M ", "365d"), ""),
     **dict.fromkeys(("s", "+5", "5 m", "30m1h", "1h1h", "1e3", "inf", ".5"), DURATION),
     **dict.fromkeys(("5.", "5w", "٥s", "14:30"), DURATION),
     **dict.fromkeys(("367d", "9" * 400 + "d", "99999999999h"), "more than a year"),
