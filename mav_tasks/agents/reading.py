@@ -1,6 +1,7 @@
 """The tools that change nothing: vehicles, queue, history, task, wait."""
 
 import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 from mav_tasks.agents.forms import (
@@ -12,14 +13,15 @@ from mav_tasks.agents.forms import (
     task_form,
 )
 from mav_tasks.agents.rovers import Rovers
-from mav_tasks.agents.tool import Report, Tool, Values
+from mav_tasks.agents.tool import Report, Run, Tool, Values
 from mav_tasks.client.descriptions import needs_decision, state_of, what_of, why_of
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json, vehicle_json
+from mav_tasks.client.operations import OPERATION
 from mav_tasks.client.parts import TASK_ID, VEHICLE_ID
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.config.setting_keys.parts import Part
-from mav_tasks.config.setting_keys.schema import an_object, listed
+from mav_tasks.config.setting_keys.schema import Schema, an_object, listed
 from mav_tasks.config.setting_keys.shapes import Number
 
 LONGEST_WAIT = 300  # s
@@ -92,45 +94,26 @@ def _limit(values: Values) -> int:
     return 20 if values["limit"] is None else values["limit"]
 
 
+def _shows(
+    name: str, title: str, arguments: Sequence[Part], returns: Schema, run: Run, *, of: str = ""
+) -> Tool:
+    """Return the tool of a declared operation; ``of``: its name there, if it is another one."""
+    declared = OPERATION[of or name]
+    about = f"{declared.summary}. {declared.advice}"
+    return Tool(name, title, about, arguments, returns, run, is_reading=True)
+
+
 READING = (
-    Tool(
-        "vehicles",
-        "Rovers",
-        "Show the rovers: position, heading, mode, whether each is armed and heard. Read this "
-        "first. A rover that is not heard cannot be driven now.",
-        (),
-        an_object({"vehicles": listed(VEHICLE)}),
-        _vehicles,
-        is_reading=True,
-    ),
-    Tool(
-        "queue",
-        "Queue",
-        "Show the running and the waiting tasks of a rover, why each waits, whether the queue is "
-        "paused, and the halt_epoch that resume and release need. 'advice' says what to do now.",
-        (ROVER, LIMIT),
-        QUEUE,
-        _queue,
-        is_reading=True,
-    ),
-    Tool(
+    _shows("vehicles", "Rovers", (), an_object({"vehicles": listed(VEHICLE)}), _vehicles),
+    _shows("queue", "Queue", (ROVER, LIMIT), QUEUE, _queue),
+    _shows(
         "history",
         "Finished tasks",
-        "List finished tasks of a rover, newest first: how each ended, why and when.",
         (ROVER, LIMIT),
         an_object({"tasks": listed(FINISHED)}),
         _history,
-        is_reading=True,
     ),
-    Tool(
-        "task",
-        "Task",
-        "Show one task: its state, progress, why it waits, and in 'advice' what to do now.",
-        (ID,),
-        TASK,
-        _task,
-        is_reading=True,
-    ),
+    _shows("task", "Task", (ID,), TASK, _task, of="status"),
     Tool(
         "wait",
         "Wait for a task",

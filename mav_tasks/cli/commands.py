@@ -2,7 +2,7 @@
 
 from mav_tasks.cli.lazy import LazyCommand as Lazy
 from mav_tasks.cli.program import Program
-from mav_tasks.client.operations import OPERATIONS, Operation
+from mav_tasks.client.operations import OPERATION, OPERATIONS, Operation
 
 HALTS = ("stop", "pause", "resume")
 
@@ -14,16 +14,18 @@ def _made(operation: Operation) -> Lazy:
     return Lazy(operation.name, f"{home}:{operation.name}", f"{operation.summary}.")
 
 
+def _shows(name: str) -> Lazy:
+    return Lazy(name, f"{name}:{name}", f"{OPERATION[name].summary}.")
+
+
 COMMANDS = (
     Lazy("serve", "serve:serve", "Run the task server.", kind="serve:ServeCommand"),
     Program("sim", "rover_sim", "Run simulated rovers on UDP 14580."),
     Program("demo", "rover_sim.demo", "Run the demonstration: three tasks, driven and measured."),
     Lazy("submit", "submit:app", "Submit a task."),
-    Lazy("status", "status:status", "Show a task, and what to do if it waits for you."),
-    Lazy("queue", "queue:queue", "Show the running and the waiting tasks, and why they wait."),
-    Lazy("history", "history:history", "List finished tasks, newest first."),
+    *(_shows(name) for name in ("status", "queue", "history")),
     *map(_made, OPERATIONS),
-    Lazy("vehicles", "vehicles:vehicles", "Show the rovers of the server."),
+    _shows("vehicles"),
     Lazy("ready", "ready:ready", "Check that the server answers and that it hears its rovers."),
     Lazy(
         "doctor",

@@ -107,4 +107,37 @@ OPERATIONS = (
         by_hand={"command": "takes the held task if none is named"},
     ),
 )
-OPERATION = {each.name: each for each in OPERATIONS}
+#: those that only show something: each surface shows it in its own way, so the words are shared,
+#: but for what is returned
+READING = (
+    Operation(
+        "vehicles",
+        "all",
+        "Show the rovers of the server",
+        advice="Position, heading, mode, whether each is armed and heard. Read this first. A rover "
+        "that is not heard cannot be driven now.",
+    ),
+    Operation(
+        "queue",
+        "rover",
+        "Show the running and the waiting tasks, and why they wait",
+        "limit",
+        "Also whether the queue is paused, and the halt_epoch that resume and release need. "
+        "'advice' says what to do now.",
+    ),
+    Operation(
+        "history",
+        "rover",
+        "List finished tasks, newest first",
+        "limit",
+        "How each ended, why and when.",
+    ),
+    Operation(
+        "status",
+        "task",
+        "Show a task, and what to do if it waits for you",
+        advice="Its state, progress, why it waits, and in 'advice' what to do now.",
+        by_hand={"tool": "is named task"},
+    ),
+)
+OPERATION = {each.name: each for each in (*OPERATIONS, *READING)}

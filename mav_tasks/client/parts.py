@@ -35,5 +35,6 @@ OF_OPERATIONS = {
         Part("series", Flag(), "end its series, too: it does not repeat any more"),
         Part("running_too", Flag(), "also cancel the running task"),
         Part("clear", Flag(), "also cancel the waiting tasks"),
+        Part("limit", Number(0, 10_000, is_whole=True), "at most this many tasks"),
     )
 }

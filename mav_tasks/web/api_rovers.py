@@ -12,14 +12,13 @@ from mav_tasks.config.setting_keys.shapes import LARGEST, Items, Number, Record
 from mav_tasks.kinds.goto import ON_EARTH
 from mav_tasks.plans import PlanFile
 from mav_tasks.web.goal_places import places_of_items
-from mav_tasks.web.operation import Call, Operation
+from mav_tasks.web.operation import Call, Handler, Operation
 from mav_tasks.web.plan_text import NAME, text_part
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 from mav_tasks.web.stops import Stop
 from mav_tasks.web.users import Line
 
-LIMIT = Part("limit", Number(0, 10_000, is_whole=True), "at most this many tasks")
 SPOT = schema_of(ON_EARTH) | {"additionalProperties": True}
 FENCE = [
     NAME,
@@ -96,7 +95,7 @@ def operations(services: Services) -> list[Operation]:
 
     one = "/vehicles/{vehicle}"
     return [
-        Operation("GET", "/vehicles", "All rovers", vehicles, answer="Vehicles"),
+        _shows("vehicles", "/vehicles", vehicles, "Vehicles"),
         Operation("GET", one, "One rover", vehicle, answer="Vehicle"),
         Operation(
             "POST",
@@ -109,10 +108,8 @@ def operations(services: Services) -> list[Operation]:
             ],
             answer="Stop",
         ),
-        Operation("GET", f"{one}/queue", "The queue", queue, query=[LIMIT], answer="Queue"),
-        Operation(
-            "GET", f"{one}/history", "Finished tasks", history, query=[LIMIT], answer="Tasks"
-        ),
+        _shows("queue", f"{one}/queue", queue, "Queue"),
+        _shows("history", f"{one}/history", history, "Tasks"),
         Operation(
             "GET",
             f"{one}/defaults",
@@ -151,6 +148,12 @@ def operations(services: Services) -> list[Operation]:
             reading="plan",
         ),
     ]
+
+
+def _shows(name: str, path: str, handler: Handler, answer: str) -> Operation:
+    declared = OPERATION[name]
+    summary, query = declared.summary, parts_of(declared)
+    return Operation("GET", path, summary, handler, query=query, answer=answer)
 
 
 def _fence_of(call: Call) -> PlanFile:

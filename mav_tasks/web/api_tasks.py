@@ -6,6 +6,7 @@ from starlette.responses import Response
 
 from mav_tasks.client.aio import Client
 from mav_tasks.client.json_form import timing_json
+from mav_tasks.client.operations import OPERATION
 from mav_tasks.client.parts import (
     GOALS,
     KEY_TEXT,
@@ -110,7 +111,7 @@ def operations(services: Services) -> list[Operation]:
             answer="Plan",
             reading="preview",
         ),
-        Operation("GET", one, "One task", task, answer="Task"),
+        Operation("GET", one, OPERATION["status"].summary, task, answer="Task"),
         Operation(
             "GET",
             f"{one}/timing",

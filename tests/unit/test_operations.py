@@ -62,6 +62,8 @@ def test_each_surface_has_each_operation_or_a_reason() -> None:
     paths = document_of(operations_of(MagicMock()))["paths"]
     tools = {tool.name: tool for tool in driving("")}
     commands = {each.name: each for each in COMMANDS}
+    for name in commands.keys() - {"sim", "demo"}:
+        assert commands[name].load().help.partition("\n")[0] == commands[name].help
     for each in OPERATIONS:
         route = ROUTES[each.about] + each.name
         verbs = paths[route.removesuffix("/modify") if each.name in WITHOUT else route]
