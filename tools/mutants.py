@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CORE = ("engine", "tasks")
 #: tests that only compute: tools/test runs the others beside them
 LEFT_OUT = (
-    *("browser", "e2e", "interop", "test_documents.py", "sim", "unit/fleet_io"),
+    *("browser", "e2e", "interop", "test_documents.py", "sim", "unit/fleet/io"),
     *("unit/links", "unit/recording", "unit/store", "unit/rover_sim", "unit/tools"),
     "test_forbidden.py",
 )

@@ -22,7 +22,7 @@ from pymavlink import mavutil
 
 from tests.kit.commands import called
 from tests.kit.processes import free_tcp_ports, stand, submit, wait_for
-from tests.unit.mcap_export.json_schema import check
+from tests.unit.recording.mcap_export.json_schema import check
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.recording.mcap_export.exporting import export
-from tests.unit.mcap_export.test_round_trip import check_messages, json_of, stamped
+from tests.unit.recording.mcap_export.test_round_trip import check_messages, json_of, stamped
 
 ROVER, SERVER = Address(1, 1), Address(250, 191)
 START = 1_763_726_400_000_000  # us

@@ -7,7 +7,7 @@ from tests.kit.cases import for_each
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.conftest import make_world as make_world
 from tests.scenarios.test_replay import WORLDS
-from tests.unit.mcap_export.test_round_trip import json_of, made_of
+from tests.unit.recording.mcap_export.test_round_trip import json_of, made_of
 
 
 @for_each("kind", WORLDS)

@@ -14,7 +14,7 @@ from mav_tasks.client.operations import OPERATIONS
 from mav_tasks.web.application import operations_of
 from mav_tasks.web.openapi import document_of
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 ROUTES = {"rover": "/vehicles/{vehicle}/", "task": "/tasks/{task}/", "all": "/"}
 WITHOUT = {"modify"}  # a path of its own: it is the PATCH of a task
 

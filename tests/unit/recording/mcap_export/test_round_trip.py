@@ -22,7 +22,7 @@ from mav_tasks.mavlink.layout import Layout
 from mav_tasks.recording.mcap_export.convention import RAW
 from mav_tasks.recording.mcap_export.exporting import Counts, export
 from tests.kit.commands import session
-from tests.unit.mcap_export.json_schema import check, check_schema
+from tests.unit.recording.mcap_export.json_schema import check, check_schema
 from tests.unit.recording.odd_packets import SIGNED, UNKNOWN, V1, WRONG_CRC
 
 ROVER, OTHER, GCS = Address(1, 1), Address(2, 1), Address(255, 190)
