@@ -113,6 +113,8 @@ class GcsClient:
         self._memory = Memory()
         self._senders: dict[Address, Sender] = {}
         self._observers: Sender | None = None
+        #: of the packet in hand
+        self.sender = Sender(self._memory)
         self.take_rights(NOTHING)
         self.apply(settings)
 
@@ -166,8 +168,8 @@ class GcsClient:
         submitter = task.submitter
         return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
 
-    def sender(self, source: Address) -> Sender:
-        """Return the ``Sender`` of the address of the packet in hand; one for all observers.
+    def sender_at(self, source: Address) -> Sender:
+        """Return the ``Sender`` of an address; one for all observers.
 
         Nothing of theirs lets a rover go, so that neither their numbers nor their words matter.
         """
@@ -183,7 +185,7 @@ class GcsClient:
     def heard(self, packet: Packet, *, now: float) -> None:
         source = packet.source
         if not self.is_observer:
-            self.sender(source).line.place(packet.seq, now=self.arrived)
+            self.sender.line.place(packet.seq, now=self.arrived)
         self.is_passing = not self.is_heard
         if now - self.heard_at > BACK_AFTER:
             for view in self.views.values():

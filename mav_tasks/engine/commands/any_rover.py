@@ -123,7 +123,7 @@ class AnyRover:
             return
         if command.target.component_id not in (0, self._vehicles.our_address.component_id):
             return
-        sender = client.sender(packet.source)
+        sender = client.sender
         if known := sender.same_packet(packet.raw, now=now):
             if known.answer is not None:
                 client.answer(known.answer, packet.source)

@@ -193,7 +193,7 @@ class MessageRequest(CommandRequest):
         target = Address(vehicle.system_id, AUTOPILOT)
         params = (*vehicle.persona.mode_params(mode), 0.0, 0.0, 0.0, 0.0)
         command = Command(target, MavCmd.DO_SET_MODE, params, 0, None, NO_MESSAGE)
-        said = client.sender(packet.source).take_in(command, packet.raw, now=now)
+        said = client.sender.take_in(command, packet.raw, now=now)
         return cls(client, vehicle, packet, said, row_of_command(SET_MODE))
 
     @property

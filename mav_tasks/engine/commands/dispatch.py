@@ -68,7 +68,7 @@ class Commands:
         if vehicle is None:
             self._of_unheard(client, packet, command, now=now)
             return
-        sender = client.sender(packet.source)
+        sender = client.sender
         known = sender.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle, after=now - known.at):
             if known.answer is not None and not known.is_held:
@@ -283,7 +283,7 @@ class Commands:
         if not targets and not unheard:
             return
         killed = [vehicle.joint.stop(clear=clear, actor=actor, now=now) for vehicle in targets]
-        sender = client.sender(packet.source)
+        sender = client.sender
         for vehicle in targets:
             vehicle.tasks.halts.was_said_by(sender, sender.line.number_of(packet.seq))
         silent = [vehicle.system_id for vehicle in targets if not vehicle.is_heard(now=now)]

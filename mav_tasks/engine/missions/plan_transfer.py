@@ -331,7 +331,7 @@ class PlanTransfer(Transfer):
         item = item_of(message)
         params = NOWHERE if item is None else item.params
         command = Command(self.address, message.command, params, 0, message.frame, NO_MESSAGE)
-        said = client.sender(packet.source).take_in(command, packet.raw, now=now)
+        said = client.sender.take_in(command, packet.raw, now=now)
         asked = GuidedItemRequest(client, self._vehicle, packet, said, row_said(command))
         try:
             if message.current == ONLY_HIGHER:
