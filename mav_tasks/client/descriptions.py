@@ -2,7 +2,8 @@
 
 from math import degrees
 
-from mav_tasks.client.values import QueueStatus, TaskStatus, Unit
+from mav_tasks.client.values import QueueStatus, TaskStatus
+from mav_tasks.kinds import Unit
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 
 UNITS = {Unit.METRES: "m", Unit.RADIANS: "deg", Unit.SECONDS: "s", Unit.ITEMS: "items"}

@@ -6,6 +6,7 @@ from enum import IntEnum
 from math import inf, isfinite
 from typing import TypeVar
 
+from mav_tasks.kinds import Unit
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
@@ -16,16 +17,6 @@ UNKNOWN_POSITION = 65535
 UNKNOWN_PROGRESS = 255
 SHARES_ID = 1  # TASK_QUEUE_STATUS.flags
 NO_HEARTBEAT = 0xFFFFFFFF
-
-
-class Unit(IntEnum):
-    """TASK_UNIT: what ``TaskStatus.remaining`` counts."""
-
-    NONE = 0
-    METRES = 1
-    RADIANS = 2
-    SECONDS = 3
-    ITEMS = 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """What the server asks of a goal, a step of a plan or a leg; a kind answers what is special."""
 
-from enum import Enum, auto
+from enum import IntEnum
 from math import radians, sqrt
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
@@ -18,12 +18,14 @@ ON_SPOT = 0.02  # m; nearer counts as there
 TURNED = radians(30)  # rad; a smaller heading error cannot hide a whole turn
 
 
-class Unit(Enum):
-    """What a leg is counted in."""
+class Unit(IntEnum):
+    """TASK_UNIT: what the remainder of a leg, or of a plan, is counted in."""
 
-    METRES = auto()
-    RADIANS = auto()
-    SECONDS = auto()
+    NONE = 0
+    METRES = 1
+    RADIANS = 2
+    SECONDS = 3
+    ITEMS = 4
 
 
 class Ability(NamedTuple):

@@ -97,9 +97,6 @@ STATES = tuple(state.name.lower() for state in TaskState)  # names, by number
 
 FINISHED = 1.0  # param4 of REQUEST_MESSAGE(TASK_STATUS, 0): finished tasks
 
-UNIT_NONE = 0  # TASK_UNIT
-UNIT_METRES = 1
-UNITS = {Unit.METRES: UNIT_METRES, Unit.RADIANS: 2, Unit.SECONDS: 3}
 FLOAT32_MAX = 3.4e38
 UNKNOWN_POSITION = 65535
 LAST_POSITION = 65534  # this or a later position: a queue may be longer than the field allows
@@ -296,20 +293,20 @@ def whole_of(value: float) -> int:
     return int(value) if isfinite(value) and value == int(value) and value >= 0 else -1
 
 
-def _left(task: Task, tasks: VehicleTasks) -> tuple[int, float]:
-    """Return how much is left, and its TASK_UNIT: the way to a place or of a plan, else the leg."""
+def _left(task: Task, tasks: VehicleTasks) -> tuple[Unit, float]:
+    """Return how much is left, and its unit: the way to a place or of a plan, else the leg."""
     if isinstance(task.goal, GoTo | Plan) and task.progress.anchor and task.state not in TERMINAL:
         way = time_left(task.goal, task.progress, known_of(tasks)).metres
         if way > 0.0:
-            return UNIT_METRES, way if way < FLOAT32_MAX else nan
+            return Unit.METRES, way if way < FLOAT32_MAX else nan
     goal = present_goal(task.goal, task.progress)
     if task.progress.anchor is not None:
         leg = goal.leg_of(task.progress)
     elif isinstance(goal, Leg):
         leg = goal
     else:
-        return UNIT_NONE, nan  # the size of its first leg is not known before it starts
-    return UNITS[leg.unit], max(0.0, leg.length - task.progress.done)
+        return Unit.NONE, nan  # the size of its first leg is not known before it starts
+    return leg.unit, max(0.0, leg.length - task.progress.done)
 
 
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
