@@ -24,6 +24,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.mavlink.float_param import to_param
+from mav_tasks.mavlink.special_values import FINISHED
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
 T = TypeVar("T")
@@ -33,7 +34,6 @@ PAGE_TRIES = 6
 PARAMETER_TRIES = 4
 BY_NAME = -1  # param_index of a request
 PAGE_WITHIN = 0.3  # s to wait for the rest of a page after its ack
-FINISHED = 1.0  # param4 of REQUEST_MESSAGE: finished tasks
 LATER = 1.0  # s until a rate-limited request is sent again
 MOST_HEARD = 1000  # unread texts; later ones are dropped
 

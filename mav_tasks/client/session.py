@@ -31,7 +31,7 @@ from mav_tasks.engine.services import statustext
 from mav_tasks.engine.services.statustext import TextReceiver
 from mav_tasks.engine.services.vehicle_status import HeartbeatSender, component_heartbeat
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavState
 from mav_tasks.mavlink.float_param import to_param
@@ -43,7 +43,6 @@ WORDS_WITHIN = 0.25
 #: Hz of telemetry; a client's share of a busy link is small
 TELEMETRY_RATE = 1
 ALL, POSITION, ATTITUDE = 0, 6, 10  # MAV_DATA_STREAM
-EVERYBODY = 0  # target_system
 FOLLOWED_AGAIN = 3.0  # s for which a request about a followed task is repeated
 
 DECODED = frozenset(
@@ -211,7 +210,7 @@ class Session:
 
         if self._listing is not None:  # the link came up only now
             self.calls.settle(self._listing, is_answered=True, now=now)
-        request = request_message(EVERYBODY, m.TaskQueueStatus.id)
+        request = request_message(BROADCAST, m.TaskQueueStatus.id)
         self._listing = Call(request, give_up_after=inf)
         self.call(self._listing, done, now=now)
 

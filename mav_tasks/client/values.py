@@ -9,14 +9,15 @@ from typing import TypeVar
 from mav_tasks.kinds import Unit
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.special_values import (
+    NO_HEARTBEAT,
+    SHARES_ID,
+    UNKNOWN_POSITION,
+    UNKNOWN_PROGRESS,
+)
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
 
 E = TypeVar("E", bound=IntEnum)
-
-UNKNOWN_POSITION = 65535
-UNKNOWN_PROGRESS = 255
-SHARES_ID = 1  # TASK_QUEUE_STATUS.flags
-NO_HEARTBEAT = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from typing import assert_never
 from mav_tasks.config.parameter_table import with_all
 from mav_tasks.config.settings import Settings
 from mav_tasks.engine import inputs
-from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
+from mav_tasks.engine.clients.broadcasts import Broadcasts
 from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
@@ -44,6 +44,7 @@ from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.shown import REWRITTEN
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import BROADCAST
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.sequence import RestartWatch
 from mav_tasks.tasks.deduplicator import SubmissionDeduplicator
@@ -377,7 +378,7 @@ class Engine:
     def _kind_of(self, received: Received) -> Kind:
         message, command = received.message, received.command
         target = getattr(message, "target_system", 0)
-        is_of_all = target in (EVERYBODY, self._vehicles.our_address.system_id)
+        is_of_all = target in (BROADCAST, self._vehicles.our_address.system_id)
         vehicle = (
             next(iter(self._vehicles.all), None) if is_of_all else self._vehicles.look_at(target)
         )
@@ -403,7 +404,7 @@ class Engine:
             return
         if len(received.client.introduced) < len(self._vehicles.by_id):
             self._publisher.welcome(received.client, now=now)
-        if getattr(received.message, "target_system", None) == EVERYBODY:
+        if getattr(received.message, "target_system", None) == BROADCAST:
             for each in self._broadcasts.addressed(received):
                 self._see_to(each, now=now)
         else:

@@ -27,6 +27,9 @@ class Address(NamedTuple):
         )
 
 
+EVERYBODY = Address(BROADCAST, BROADCAST)
+
+
 @cache  # there are 65,536, and each packet asks for some
 def address_of(system_id: int, component_id: int) -> Address:
     """Return an address as it comes from the wire."""

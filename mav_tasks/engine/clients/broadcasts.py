@@ -16,10 +16,8 @@ from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.services.commands import command_of
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST
 from mav_tasks.mavlink.codec import Packer
-
-EVERYBODY = 0  # target_system and target_component
 
 
 @dataclass(repr=False, eq=False)
@@ -43,7 +41,7 @@ class Broadcasts:
         """Return a client's packet with this rover's autopilot as its target."""
         message: Any = copy(received.message)  # one of several classes with these fields
         message.target_system = system_id
-        if getattr(message, "target_component", AUTOPILOT) == EVERYBODY:
+        if getattr(message, "target_component", AUTOPILOT) == BROADCAST:
             message.target_component = AUTOPILOT
         packet = received.packet
         raw = self._packer.pack(message, packet.source, seq=packet.seq)

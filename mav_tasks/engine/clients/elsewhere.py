@@ -21,13 +21,12 @@ from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets,
 from mav_tasks.engine.services.commands import command_of, is_stop
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import BROADCAST, Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.tasks.lifecycle import TaskReason
 
-EVERYBODY = 0  # target_system
 MOST = 4096  # clients whose number is remembered
 #: s; the longest time without a holder after a gateway has failed, and what the database then takes
 IN_TRANSIT = 3.0
@@ -95,7 +94,7 @@ class Elsewhere:
         return [
             each.received
             for each in self._stops
-            if vehicle in each.owed or (each.at >= recent and each.target in (EVERYBODY, vehicle))
+            if vehicle in each.owed or (each.at >= recent and each.target in (BROADCAST, vehicle))
         ]
 
     def stops_for(self, vehicle: int, *, now: float) -> list[Received]:
@@ -120,7 +119,7 @@ class Elsewhere:
         if received.client.key[0] == FLEET_LINK:
             return False
         target = self._target_of(received)
-        if target == EVERYBODY or isinstance(message, m.Heartbeat):
+        if target == BROADCAST or isinstance(message, m.Heartbeat):
             for gateway in sorted(set(self._holders.values())):
                 self._pass_on(gateway, received)
             return False
@@ -165,7 +164,7 @@ class Elsewhere:
         """Return whom a packet is for; a STOP to the server's own system is for all."""
         target: int | None = getattr(received.message, "target_system", None)
         is_ours = target == self._vehicles.our_address.system_id
-        return EVERYBODY if is_ours and is_stop(received.message) else target
+        return BROADCAST if is_ours and is_stop(received.message) else target
 
     def bring_back(self, item: Packets) -> Packets:
         """Send our clients what other gateways have for them; return the rest: their clients'."""
@@ -191,7 +190,7 @@ class Elsewhere:
         owed = {
             each
             for each in self._had
-            if is_of_ours and target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
+            if is_of_ours and target in (BROADCAST, each) and self._vehicles.look_at(each) is None
         }
         said = client.key, target
         kept = [each for each in self._stops if (each.received.client.key, each.target) != said]
@@ -214,7 +213,7 @@ class Elsewhere:
                 theirs = {each for each, gateway in self._holders.items() if gateway == by}
                 for each in self._stops:
                     if each.received.client.key == client:
-                        is_for_all = each.target == EVERYBODY
+                        is_for_all = each.target == BROADCAST
                         each.owed.difference_update(theirs if is_for_all else {packet.system_id})
 
     def _pass_on(self, gateway: str, received: Received) -> None:

@@ -21,9 +21,10 @@ from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.services.commands import Command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address, address_of
+from mav_tasks.mavlink.address import EVERYBODY, Address, address_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.special_values import FINISHED, PAGE
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -33,8 +34,6 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 R = TaskReason
 
 PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
-EVERYBODY = Address(0, 0)
-PAGE = 16  # waiting or finished tasks that one request returns
 MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_INTERVAL_ID = 0xFFFF  # of MESSAGE_INTERVAL.message_id
 
@@ -192,7 +191,7 @@ class MessageRequests:
             case m.TaskStatus.id:
                 first = max(0, translate.whole_of(command.params[2]))
                 ids = tasks.page(first, PAGE)
-                if command.params[3] == translate.FINISHED:
+                if command.params[3] == FINISHED:
                     ids = registry.finished(tasks.vehicle, first, PAGE)
                 self._send(to, [registry[each] for each in ids])
             case _:

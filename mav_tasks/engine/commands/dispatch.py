@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 
 from mav_tasks.basics.errors import Rejection
-from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
@@ -29,7 +28,7 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.kinds.commands import PARSERS
 from mav_tasks.kinds.params import bad, has_place, whole
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -108,7 +107,7 @@ class Commands:
         if tasks is None:
             is_question = command.command == MavCmd.REQUEST_MESSAGE
             is_for_servers = is_question and message_id_of(command) == m.TaskQueueStatus.id
-            if system_id != EVERYBODY or not is_for_servers:
+            if system_id != BROADCAST or not is_for_servers:
                 return
             address = self._vehicles.our_address
         elif command.command == MavCmd.REQUEST_MESSAGE:
@@ -142,7 +141,7 @@ class Commands:
         )
 
     def _dispatch(self, asked: CommandRequest, *, now: float) -> None:
-        if asked.command.target.system_id == EVERYBODY:  # others: see ``Broadcasts``
+        if asked.command.target.system_id == BROADCAST:  # others: see ``Broadcasts``
             number = asked.command.command
             raise Rejection(R.BAD_PARAMETER, f"command {number} must name one rover, not system 0")
         row, component = asked.row, asked.command.target.component_id
@@ -274,7 +273,7 @@ class Commands:
         """
         target = command.target
         if target.system_id == self._vehicles.our_address.system_id:  # the server's: all
-            target = Address(EVERYBODY, target.component_id)
+            target = Address(BROADCAST, target.component_id)
         targets = self._vehicles.addressed_by(target.system_id)
         actor = str(client.submitter(packet.source))
         is_to_clear = command.params[0] == 1.0

@@ -29,7 +29,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.kinds.goto import CHANGE_MODE, reposition_flags
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.address import AUTOPILOT, EVERYBODY, Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
@@ -236,9 +236,6 @@ def deliver(
         client.answer(answer, asker.source)
     else:
         submissions.answer_halt(client, asker.halt, asker.source, now=now)
-
-
-EVERYBODY = Address(0, 0)
 
 
 class Forwarder:

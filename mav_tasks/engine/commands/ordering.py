@@ -16,6 +16,7 @@ from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.services.commands import COPIED, DOUBLED, Command
 from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.special_values import EPOCHS
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: index of the parameter with the halt epoch that the sender was shown, by command
@@ -25,7 +26,6 @@ EPOCH_IN: dict[int, int] = {
     MavCmd.MISSION_START: 2,
 }
 REPEATED = 2.0  # s, within which MAVSDK repeats an unanswered command, unmarked: at 1.5 s
-EPOCHS = 1 << 24  # epochs that a float32 tells apart
 AGAIN = "wait 4 s and repeat it if you mean it"
 
 

@@ -12,6 +12,11 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.float_param import EXACT, large_number
+from mav_tasks.mavlink.special_values import (
+    NO_HEARTBEAT,
+    SHARES_ID,
+    UNKNOWN_POSITION,
+)
 from mav_tasks.tasks.driving.estimate import time_left
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.events import (
@@ -34,9 +39,7 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
 
-NEVER = 0xFFFFFFFF  # TASK_QUEUE_STATUS.heartbeat_age: no heartbeat came
 
-SHARES_ID = 1  # TASK_QUEUE_STATUS.flags
 TWIN_FOR = 10.0  # s for which the other one is told of after its last heartbeat
 
 #: results of a command that has halted a vehicle; FAILED: it is silent, or the halt is not kept
@@ -95,12 +98,9 @@ CALM = frozenset(
 
 STATES = tuple(state.name.lower() for state in TaskState)  # names, by number
 
-FINISHED = 1.0  # param4 of REQUEST_MESSAGE(TASK_STATUS, 0): finished tasks
 
 FLOAT32_MAX = 3.4e38
-UNKNOWN_POSITION = 65535
 LAST_POSITION = 65534  # this or a later position: a queue may be longer than the field allows
-UNKNOWN_PROGRESS = 255
 TEXT = 50  # bytes of TASK_STATUS.text
 
 
@@ -195,7 +195,9 @@ def queue_status(
     ``gateway``: the name of this server in its fleet.
     """
     active = tasks.active
-    age = NEVER if heard_at is None else min(max(1, round((now - heard_at) * 1000)), NEVER - 1)
+    age = NO_HEARTBEAT
+    if heard_at is not None:
+        age = min(max(1, round((now - heard_at) * 1000)), NO_HEARTBEAT - 1)
     return m.TaskQueueStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
         version=version & 0xFFFFFFFF,
