@@ -11,7 +11,7 @@ from mav_tasks.agents.tool import Report, Tool, Values
 from mav_tasks.client.asking import ask, parts_of
 from mav_tasks.client.operations import OPERATION, OPERATIONS, Operation
 from mav_tasks.client.parts import GOALS, KEY_TEXT
-from mav_tasks.client.terms import TERMS
+from mav_tasks.client.terms import OF_NEW
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Items
 from mav_tasks.kinds.in_json import goal_schema
@@ -26,11 +26,11 @@ SUBMISSION = (
         True,
     ),
     ROVER,
-    TERMS["priority"],
-    TERMS["after"],
-    replace(TERMS["delay"], name="start_in"),
-    TERMS["deadline"],
-    TERMS["label"],
+    OF_NEW["priority"],
+    OF_NEW["after"],
+    replace(OF_NEW["delay"], name="start_in"),
+    OF_NEW["deadline"],
+    OF_NEW["label"],
 )
 
 

@@ -13,7 +13,7 @@ from mav_tasks.basics.errors import NoAnswer, Refused, UsageError
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
 from mav_tasks.client.idempotency import Numbers, numbers_of
-from mav_tasks.client.terms import Changes, requested
+from mav_tasks.client.terms import CommonTerms, requested
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.client.wire import Goal
 from mav_tasks.kinds.in_json import goals_of
@@ -31,7 +31,7 @@ class Wish:
     rover: int
     goals: Sequence[Goal]
     key: str
-    terms: Changes
+    terms: CommonTerms
 
     @classmethod
     def of(cls, rover: int, values: dict[str, Any]) -> "Wish":

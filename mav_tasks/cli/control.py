@@ -11,7 +11,7 @@ from mav_tasks.cli.command import command
 from mav_tasks.cli.lazy import completing
 from mav_tasks.cli.options import Common, TaskId
 from mav_tasks.cli.session import find_task, opened, values_checked
-from mav_tasks.cli.terms import TaskTerms
+from mav_tasks.cli.terms import ChangedTerms
 from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import state_of
@@ -105,7 +105,7 @@ async def clear(
 
 
 @command
-async def modify(task_id: TaskId, terms: TaskTerms, common: Common) -> None:
+async def modify(task_id: TaskId, terms: ChangedTerms, common: Common) -> None:
     """Change a task that has not ended.
 
     Options that you omit leave the task unchanged.

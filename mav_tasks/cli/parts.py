@@ -29,7 +29,7 @@ def parameter_of(part: Part, *, key: str = "", metavar: str | None = None) -> Pa
     """
     key = key or part.name
     words = part.meaning[:1].upper() + part.meaning[1:]
-    words += ", for example 30s or 5m" if part.shape.unit == SECONDS else ""
+    words += " (for example 30s or 5m)" if part.shape.unit == SECONDS else ""
     names = getattr(part.shape, "words", ())
     words += f": {', '.join(names)}" if names else ""
     name = f"--{part.name.replace('_', '-')}"
@@ -58,7 +58,7 @@ def value_of(part: Part, text: str | bool) -> object:
     if isinstance(text, bool):
         return text
     if part.shape.unit == SECONDS:
-        return parse_duration(_metavar(part), text)
+        return parse_duration(_metavar(part) if part.is_required else f"--{part.name}", text)
     try:
         return part.shape.read(text)
     except SettingError:

@@ -14,7 +14,7 @@ from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import AnyCommon, Common, TaskOptions, Wait
 from mav_tasks.cli.session import ChoiceHeard, opened, rover_of, values_checked
 from mav_tasks.cli.submit import tell_submitted
-from mav_tasks.cli.terms import TaskTerms
+from mav_tasks.cli.terms import NewTerms
 from mav_tasks.plans import PlanFile, format_plan, read_plan, write_plan
 from mav_tasks.tasks.task import ANY
 
@@ -45,7 +45,7 @@ rally = group("Upload and clear rally points.")
 @command
 async def upload_mission(
     file: FileIn,
-    terms: TaskTerms,
+    terms: NewTerms,
     options: TaskOptions,
     common: AnyCommon,
     stage: Annotated[

@@ -15,7 +15,7 @@ from mav_tasks.cli.options import AnyCommon, Common, TaskOptions
 from mav_tasks.cli.parts import parameter_of, value_of
 from mav_tasks.cli.places import parse_place
 from mav_tasks.cli.session import ChoiceHeard, is_alone, opened, rover_of, values_checked
-from mav_tasks.cli.terms import TaskTerms
+from mav_tasks.cli.terms import NewTerms
 from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
@@ -46,7 +46,7 @@ async def goto(
     east: Annotated[
         str, typer.Argument(metavar="EAST|LON", help="Metres, or degrees with --global.")
     ],
-    terms: TaskTerms,
+    terms: NewTerms,
     options: TaskOptions,
     common: AnyCommon,
     is_global: Annotated[
@@ -78,7 +78,7 @@ def _add(form: Form) -> None:
     """Add the command of a kind: its required parts are arguments, the others options."""
 
     async def submit(
-        terms: TaskTerms, options: TaskOptions, common: AnyCommon, **given: str | None
+        terms: NewTerms, options: TaskOptions, common: AnyCommon, **given: str | None
     ) -> None:
         pairs = ((part, given[part.name]) for part in form.numbers)
         parts = {part.name: value_of(part, text) for part, text in pairs if text is not None}
@@ -91,7 +91,7 @@ def _add(form: Form) -> None:
     add(command(submit))
 
 
-SHARED = {"terms": TaskTerms, "options": TaskOptions, "common": AnyCommon}
+SHARED = {"terms": NewTerms, "options": TaskOptions, "common": AnyCommon}
 
 
 for each in FORMS:
@@ -102,7 +102,7 @@ for each in FORMS:
 
 
 async def _submit(
-    goals: Sequence[Goal], terms: TaskTerms, options: TaskOptions, common: Common
+    goals: Sequence[Goal], terms: NewTerms, options: TaskOptions, common: Common
 ) -> None:
     output.warn(PLUGGED.broken)
     wished, heard = terms.read(), ChoiceHeard()

@@ -1,26 +1,28 @@
 """The options for the terms of a task, made from their declarations; times as people write them."""
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from inspect import Parameter
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli.parts import parameter_of, value_of
 from mav_tasks.cli.times import parse_duration, parse_moment
-from mav_tasks.client.terms import TERMS, Changes
+from mav_tasks.client.terms import OF_CHANGES, OF_NEW, Changes, CommonTerms
+from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Text
+from mav_tasks.tasks.task import MAX_PRIORITY
 
 NEVER = "never"  # of --every
-PARTS = TERMS | {
-    "delay": replace(TERMS["delay"], name="in"),
+PARTS = OF_CHANGES | {
+    "delay": replace(OF_CHANGES["delay"], name="in"),
     "at": replace(
-        TERMS["at"],
+        OF_CHANGES["at"],
         meaning="start at 14:30 or 2026-11-20T14:30; local time unless it names a zone",
     ),
     "every": replace(
-        TERMS["every"],
+        OF_CHANGES["every"],
         shape=Text("a period"),
         meaning="repeat: 90s, 1h30m, 1d, or a cron expression in UTC or a zone:"
         f" '0 6 * * 1-5 Europe/Zurich'; {NEVER}: do not repeat any more",
@@ -28,6 +30,7 @@ PARTS = TERMS | {
 }
 #: metavars of the options that do not show what their values look like
 METAVARS = {
+    "priority": f"0..{MAX_PRIORITY}",
     "after": "ID",
     "before": "ID",
     "label": "TEXT",
@@ -36,24 +39,44 @@ METAVARS = {
 }
 
 
-class TaskTerms:
-    """The options for when and how a task runs."""
+class _Typed:
+    """The options of some terms, as they were typed; an empty text says nothing, but no label."""
+
+    of: ClassVar[Mapping[str, Part]]
 
     def __init__(self, **typed: str | bool | None) -> None:
-        self._typed = {name: text for name, text in typed.items() if text is not None}
+        given = {name: text for name, text in typed.items() if text is not None}
+        self._typed = {name: text for name, text in given.items() if text != "" or name == "label"}
 
-    @staticmethod
-    def parameters() -> Iterable[Parameter]:
+    @classmethod
+    def parameters(cls) -> list[Parameter]:
         """Return the options, for ``command``."""
-        return [
-            parameter_of(part, key=name, metavar=METAVARS.get(name)) for name, part in PARTS.items()
-        ]
+        return [parameter_of(PARTS[name], key=name, metavar=METAVARS.get(name)) for name in cls.of]
 
-    def read(self) -> Changes:
-        """Return the terms that are given. Raise UsageError or SettingError if one is invalid."""
+    def _read(self) -> dict[str, Any]:
         if {"delay", "at"} <= self._typed.keys():
             raise UsageError("--in and --at: choose one of them")
-        return cast("Changes", {name: _read(name, text) for name, text in self._typed.items()})
+        return {name: _read(name, text) for name, text in self._typed.items()}
+
+
+class NewTerms(_Typed):
+    """The options for when and how a new task runs."""
+
+    of = OF_NEW
+
+    def read(self) -> CommonTerms:
+        """Return the terms that are given. Raise UsageError or SettingError if one is invalid."""
+        return cast("CommonTerms", self._read())
+
+
+class ChangedTerms(_Typed):
+    """The options for what is to be changed of that."""
+
+    of = OF_CHANGES
+
+    def read(self) -> Changes:
+        """Return the changes that are given. Raise UsageError or SettingError if one is invalid."""
+        return cast("Changes", self._read())
 
 
 def _read(name: str, text: str | bool) -> Any:

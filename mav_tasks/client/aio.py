@@ -20,7 +20,18 @@ from mav_tasks.client.plan_sources import Plan, file_of, items_of
 from mav_tasks.client.session import TELEMETRY_RATE, Session
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.client.submissions import Submissions, utc_of
-from mav_tasks.client.terms import NOT_NUMBERS, PROPERTIES, AnyRover, Changes, Terms, given, id_of
+from mav_tasks.client.terms import (
+    NOT_NUMBERS,
+    OF_CHANGES,
+    OF_NEW,
+    PROPERTIES,
+    AnyRover,
+    Changes,
+    CommonTerms,
+    Terms,
+    given,
+    id_of,
+)
 from mav_tasks.client.values import (
     News,
     QueueStatus,
@@ -47,6 +58,7 @@ from mav_tasks.mavlink.enums import (
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.mavlink.label import check_label, text_pieces
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.mavlink.special_values import EPOCHS, PAGE
 from mav_tasks.plans import (
     PlanFile,
     fence_items,
@@ -65,8 +77,6 @@ STOP_WITHIN = 3.0  # s
 UNTIL_REPEATED = MAX_DELAY
 KILL = 1.0  # param2 of TASK_CANCEL
 RESUME = 1.0  # param1 of DO_PAUSE_CONTINUE
-EPOCHS = 1 << 24  # integers that a float32 holds exactly
-PAGE = 16  # tasks that one request returns
 NO_HISTORY = "the server does not list finished tasks: it is older than this client"
 OVERTAKEN = "a later STOP or pause overtook this request: repeat it if you still mean it"
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
@@ -254,7 +264,7 @@ class Client:
 
         What ``changes`` there are, and mean, says ``mav_tasks.client.terms.Changes``.
         """
-        terms = given(changes)
+        terms = given(changes, OF_CHANGES)
         if (every := terms.get("every")) is not None:
             await self._set_repeat(task_id, wire.repeat_of(every), vehicle=vehicle)
         numbers = {
@@ -692,10 +702,10 @@ class Client:
         vehicle: int | AnyRover | None = None,
         nonce: int = 0,
         check: int = 0,
-        **terms: Unpack[Changes],
+        **terms: Unpack[CommonTerms],
     ) -> Task:
         """Submit a plan; ``command``: its only goal, if that is sent as a command."""
-        rest = given(terms)
+        rest = given(terms, OF_NEW)
         check_label(rest.get("label", ""))
         delay, at = rest.pop("delay", 0.0), rest.get("at")
         repeat = _repeat_of(rest.pop("every", 0.0), delay, at)

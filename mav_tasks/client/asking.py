@@ -6,13 +6,13 @@ from typing import Any
 from mav_tasks.client.aio import Client
 from mav_tasks.client.operations import Operation
 from mav_tasks.client.parts import OF_OPERATIONS
-from mav_tasks.client.terms import PARTS, requested
+from mav_tasks.client.terms import CHANGES, requested
 from mav_tasks.config.setting_keys.parts import Part
 
 
 def parts_of(operation: Operation) -> list[Part]:
     """Return the parts of an operation."""
-    terms = PARTS if operation.has_terms else ()
+    terms = CHANGES if operation.has_terms else ()
     return [*terms, *(OF_OPERATIONS[name] for name in operation.parts.split())]
 
 

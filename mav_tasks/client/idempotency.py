@@ -2,7 +2,7 @@
 
 A nonce has 30 bits, and all clients of one MAVLink address and key share them. With 1,000 tasks
 remembered, a new key meets the nonce of another one once in a million submissions. So 31 more bits
-of the key, with the terms of the task, go into the plan: the server compares them with the
+of the key, with what the plan does not say, go into the plan: the server compares them with the
 rest of it, and refuses a key that only looks like another one. It never takes one task for the
 other.
 """
@@ -10,7 +10,8 @@ other.
 from hashlib import sha256
 from typing import NamedTuple
 
-from mav_tasks.client.terms import Changes
+from mav_tasks.client.terms import CommonTerms
+from mav_tasks.client.wire import repeat_of
 from mav_tasks.kinds.sent import LARGEST
 from mav_tasks.tasks.task import MAX_NONCE
 
@@ -24,12 +25,17 @@ class Numbers(NamedTuple):
     check: int
 
 
-def numbers_of(key: str, terms: Changes) -> Numbers:
-    """Return the numbers of a key; the check depends on the terms, too.
+def numbers_of(key: str, terms: CommonTerms) -> Numbers:
+    """Return the numbers of a key; the check depends on the terms that a plan does not carry.
 
-    Some are set after the submission: the server does not compare these itself.
+    They are set after the submission: the server does not compare them itself. The same terms in
+    other words have the same numbers. Raise ValueError for a bad repetition.
     """
-    rest = [f"{name} {value}" for name, value in sorted(terms.items())]
+    rest, at = [terms.get("label") or ""], terms.get("at")
+    if repeat := repeat_of(terms.get("every") or 0):
+        rest += [repeat, f"{terms['deadline']:g}"] if terms.get("deadline") else [repeat]
+    if at is not None:
+        rest.append(f"at {at.timestamp():.0f}")
     nonce = int.from_bytes(sha256(key.encode()).digest()[:16]) % MAX_NONCE + 1
-    whole = sha256("\0".join([f"{len(key)} {key}", *rest]).encode()).digest()
+    whole = sha256(" ".join((f"{len(key)}", key, "\0".join(rest))).encode()).digest()
     return Numbers(nonce, int.from_bytes(whole[:16]) % LARGEST + 1)

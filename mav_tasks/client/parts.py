@@ -1,7 +1,7 @@
 """The parts of requests in JSON, for the HTTP API and agents: each declared once. Pure."""
 
 from mav_tasks.client.idempotency import LONGEST
-from mav_tasks.client.terms import PARTS
+from mav_tasks.client.terms import CHANGES
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Choice, Flag, Items, Number, Text
 from mav_tasks.kinds.in_json import goal_schema
@@ -30,7 +30,7 @@ EPOCH = Part(
 OF_OPERATIONS = {
     part.name: part
     for part in (
-        *(*PARTS, HOW, EPOCH),
+        *(*CHANGES, HOW, EPOCH),
         Part("kill", Flag(), "put the rover into HOLD at once"),
         Part("series", Flag(), "end its series, too: it does not repeat any more"),
         Part("running_too", Flag(), "also cancel the running task"),

@@ -1,7 +1,7 @@
 """What a client may say about when and how a task runs: each term is declared once, here.
 
-From ``Changes`` come the arguments of the library, the options of the command line, and the parts
-of requests over HTTP and of agents. Pure.
+From them come the arguments of the library, the options of the command line, and the parts of
+requests over HTTP and of agents. Pure.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Flag, Number, Text
 from mav_tasks.mavlink.enums import TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL
-from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT
+from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, MIN_PERIOD
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_DELAY, MAX_PRIORITY, MAX_TASK_ID
 
 #: in place of a rover: the server chooses one
@@ -31,21 +31,18 @@ class Numbered(Protocol):
         """The task id."""
 
 
-class Changes(TypedDict, total=False):
-    """The terms of a task, which can be changed until it has ended; None: not given.
+class CommonTerms(TypedDict, total=False):
+    """What can be said of a new task, and changed until it has ended; None: not given.
 
     ``priority``: 0 to 10, 10 runs first. ``after``: a task that must complete first; 0: none.
-    ``before``: its place in the queue is just before this task, whatever their priorities; 0:
-    behind all. Times in seconds from now: the task starts no earlier than in ``delay`` seconds,
-    and expires if it has not started within ``deadline`` seconds (0: neither). ``at``: start time,
-    with a time zone. ``label``: a name of up to 24 bytes, shown with the task.
+    Times in seconds from now: the task starts no earlier than in ``delay`` seconds, and expires if
+    it has not started within ``deadline`` seconds (0: neither). ``at``: start time, with a time
+    zone. ``label``: a name of up to 24 bytes, shown with the task.
 
     ``every``: the task repeats, so many seconds from one start to the next (10 to 16,777,215; 0:
     it does not), or at the times of a cron expression in UTC, or in the time zone after it: "0 6 *
     * 1-5 Europe/Zurich". Then ``deadline`` counts from each start. With an expression there is no
     ``delay`` and no ``at``.
-
-    ``preemptible``: other tasks may interrupt it. ``preemptive``: it may interrupt other tasks.
     """
 
     priority: Annotated[
@@ -60,13 +57,9 @@ class Changes(TypedDict, total=False):
         "task that must complete first; 0: none",
         TaskProperty.RUN_AFTER,
     ]
-    before: Annotated[
-        int | Numbered | None,
-        TASK_OR_NONE,
-        "it runs just before this task; 0: last",
-        TaskProperty.RUN_BEFORE,
+    delay: Annotated[
+        float | None, WAIT, "earliest start, from now; 0: none", TaskProperty.START_DELAY
     ]
-    delay: Annotated[float | None, WAIT, "earliest start, from now", TaskProperty.START_DELAY]
     at: Annotated[
         datetime | None,
         Text("a time", least=1, most=40),
@@ -76,31 +69,26 @@ class Changes(TypedDict, total=False):
     deadline: Annotated[
         float | None,
         WAIT,
-        "latest start, from now (or from each start, if it repeats); then the task expires",
+        "the task expires if it has not started so long from now, or after each start time if it"
+        " repeats; 0: none",
         TaskProperty.DEADLINE,
     ]
     label: Annotated[
         str | None,
         Text("a name", most=MAX_LABEL),
-        f"name of the task, at most {MAX_LABEL} bytes of UTF-8",
+        f"name of the task, at most {MAX_LABEL} bytes of UTF-8; empty: none",
         TaskProperty.LABEL,
     ]
     every: Annotated[
         float | str | None,
         Number(0, MAX_PERIOD, "s", is_whole=True),
-        "repeat: from one start to the next; 0: do not",
+        f"repeat: from one start to the next, {MIN_PERIOD} or more; 0: do not",
         TaskProperty.EVERY,
     ]
-    preemptible: Annotated[
-        bool | None, Flag(), "other tasks may interrupt it", TaskProperty.PREEMPTIBLE
-    ]
-    preemptive: Annotated[
-        bool | None, Flag(), "it may interrupt other tasks", TaskProperty.PREEMPTIVE
-    ]
 
 
-class Terms(Changes, total=False):
-    """The terms of a new task: those of ``Changes``, and how it is submitted.
+class Terms(CommonTerms, total=False):
+    """The terms of a new task: those of ``CommonTerms``, and how it is submitted.
 
     ``vehicle``: "any" lets the server choose the rover that would begin first. It may choose
     again until the task begins: see ``Task.vehicle``. Places must be global then.
@@ -114,15 +102,40 @@ class Terms(Changes, total=False):
     nonce: int
 
 
+class Changes(CommonTerms, total=False):
+    """What can be changed of a task that has not ended: the terms of ``CommonTerms``, and these.
+
+    A submission does not carry them, and the server may refuse them: it would have the task then.
+
+    ``before``: its place in the queue is just before this task, whatever their priorities; 0:
+    behind all. ``preemptible``: other tasks may interrupt it. ``preemptive``: it may interrupt
+    other tasks.
+    """
+
+    before: Annotated[
+        int | Numbered | None,
+        TASK_OR_NONE,
+        "it runs just before this task; 0: last",
+        TaskProperty.RUN_BEFORE,
+    ]
+    preemptible: Annotated[
+        bool | None, Flag(), "other tasks may interrupt it", TaskProperty.PREEMPTIBLE
+    ]
+    preemptive: Annotated[
+        bool | None, Flag(), "it may interrupt other tasks", TaskProperty.PREEMPTIVE
+    ]
+
+
 _DECLARED = {
     name: hint.__metadata__ for name, hint in get_type_hints(Changes, include_extras=True).items()
 }
-#: each term as a part of a request
-TERMS = {name: Part(name, *declared[:2]) for name, declared in _DECLARED.items()}
 #: the property of TASK_MODIFY that changes each term
 PROPERTIES: dict[str, TaskProperty] = {name: each[2] for name, each in _DECLARED.items()}
 #: terms whose values are sent otherwise than as one number
 NOT_NUMBERS = ("at", "label", "every")
+#: each term as a part of a request: to change a task, and for a new one
+OF_CHANGES = {name: Part(name, *declared[:2]) for name, declared in _DECLARED.items()}
+OF_NEW = {name: OF_CHANGES[name] for name in get_type_hints(CommonTerms)}
 #: the other form of ``every`` in a request
 CRON = Part(
     "cron",
@@ -130,26 +143,27 @@ CRON = Part(
     "repeat: minute, hour, day of month, month, day of week, and perhaps a time zone, else UTC;"
     " empty: do not",
 )
-PARTS = (*TERMS.values(), CRON)
+#: all parts of these requests
+NEW, CHANGES = (*OF_NEW.values(), CRON), (*OF_CHANGES.values(), CRON)
 
 
-def given(terms: Changes) -> dict[str, Any]:
-    """Return the terms that are given. Raise TypeError if there is no such term."""
-    if unknown := terms.keys() - TERMS:
-        raise TypeError(f"unknown: {', '.join(sorted(unknown))}; expected {', '.join(TERMS)}")
+def given(terms: CommonTerms | Changes, known: Mapping[str, Part]) -> dict[str, Any]:
+    """Return the terms that are given. Raise TypeError if one is not known."""
+    if unknown := terms.keys() - known:
+        raise TypeError(f"unknown: {', '.join(sorted(unknown))}; expected {', '.join(known)}")
     return {name: value for name, value in terms.items() if value is not None}
 
 
-def requested(values: Mapping[str, Any]) -> Changes:
+def requested(values: Mapping[str, Any]) -> CommonTerms:
     """Return the terms in the parts of a request. Raise SettingError if they are invalid."""
-    terms = {name: values[name] for name in TERMS if values.get(name) is not None}
+    terms = {name: values[name] for name in OF_CHANGES if values.get(name) is not None}
     if "at" in terms:
         terms["at"] = _moment_of(terms["at"])
     if (cron := values.get("cron")) is not None:
         if cron and terms.get("every"):
             raise SettingError("every and cron: choose one of them")
         terms["every"] = cron or terms.get("every", 0)
-    return cast("Changes", terms)
+    return cast("CommonTerms", terms)
 
 
 def _moment_of(text: str) -> datetime:

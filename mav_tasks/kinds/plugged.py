@@ -17,11 +17,11 @@ from mav_tasks.kinds.base import Base
 from mav_tasks.kinds.form import Form
 
 GROUP = "mav_tasks.kinds"
-#: names of options that each submission has on the command line
+#: names that each submission has on the command line, and on the page
 TAKEN = (
-    *("priority", "after", "before", "delay", "at", "deadline", "label", "every", "preemptible"),
-    *("preemptive", "nonce", "wait", "server", "vehicle", "timeout", "sign", "keys", "json"),
-    *("kind", "help", "terms", "options", "common"),
+    *("priority", "after", "before", "delay", "at", "deadline", "label", "every", "cron", "nonce"),
+    *("preemptible", "preemptive", "wait", "server", "vehicle", "timeout", "sign", "keys", "json"),
+    *("kind", "rover", "help", "terms", "options", "common"),
 )
 
 

@@ -10,7 +10,7 @@ from starlette.responses import Response, StreamingResponse
 
 from mav_tasks.basics.errors import UsageError
 from mav_tasks.client.parts import KEY_TEXT
-from mav_tasks.client.terms import PARTS
+from mav_tasks.client.terms import CHANGES, NEW
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Text
 from mav_tasks.kinds.in_json import FORMS
@@ -53,7 +53,8 @@ def operations(services: Services) -> list[Operation]:
                 }
                 for kind in FORMS
             ],
-            "terms": [_part(part) for part in PARTS],
+            "terms": [_part(part) for part in NEW],
+            "changes": [_part(part) for part in CHANGES],
             "priority": {"least": 0, "most": MAX_PRIORITY, "default": DEFAULT_PRIORITY},
             "label_bytes": MAX_LABEL,
         }

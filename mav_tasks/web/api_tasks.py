@@ -12,7 +12,7 @@ from mav_tasks.client.parts import (
     KEY_TEXT,
 )
 from mav_tasks.client.plan_sources import Plan
-from mav_tasks.client.terms import PARTS, AnyRover
+from mav_tasks.client.terms import NEW, AnyRover
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.kinds.in_json import goals_of
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
@@ -88,7 +88,7 @@ def operations(services: Services) -> list[Operation]:
             f"/vehicles/{rover}/{name}",
             f"Submit {what} as one task{whose}",
             asks(handler),
-            body=[*body, *PARTS],
+            body=[*body, *NEW],
             reading=reading,
             answer="Task",
             status=201,

@@ -274,7 +274,8 @@ SCHEMAS: dict[str, Schema] = {
             "journal": FLAG,
             "records": FLAG,
             "goals": listed(ref("Kind")),
-            "terms": said(listed(ref("Part")), "what can be said of when and how a task runs"),
+            "terms": said(listed(ref("Part")), "what can be said of when and how a new task runs"),
+            "changes": said(listed(ref("Part")), "what can be changed of that later"),
             "priority": whole({"least": INTEGER, "most": INTEGER, "default": INTEGER}),
             "label_bytes": INTEGER,
         }

@@ -14,7 +14,7 @@ import pytest
 from mav_tasks import Move, Refused, SyncClient, Wait, read_plan
 from mav_tasks.plans import PlanFile, parse_plan
 from tests.kit.commands import Done, called, mav_tasks, session, surroundings
-from tests.kit.processes import Stand, frozen, stand, wait_until
+from tests.kit.processes import Stand, frozen, wait_until
 
 NOBODY = "udpout:127.0.0.1:9"
 WAY = """QGC WPL 110
@@ -27,12 +27,6 @@ PLAN = """{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": 
 [[-35.362, 149.164], [-35.362, 149.167], [-35.365, 149.167], [-35.365, 149.164]]}],
 "circles": []}, "rallyPoints": {"version": 2, "points": [[-35.3632, 149.1652, 0]]}}"""
 NO_FENCE = """{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}"""
-
-
-@pytest.fixture(scope="module")
-def there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
-    with stand(tmp_path_factory.mktemp("stand")) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")
@@ -171,8 +165,8 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert [(task["id"], task["priority"]) for task in queue["waiting"]] == [(waiting["id"], 9)]
 
     (later,) = called("submit", "move", "1", "--json", server=server).objects
-    before = ("--before", str(later["id"]), "--json")
-    (last,) = called("submit", "move", "1", *before, server=server).objects
+    (last,) = called("submit", "move", "1", "--json", server=server).objects
+    called("modify", str(last["id"]), "--before", str(later["id"]), server=server)
     (queue,) = called("queue", "--json", server=server).objects
     assert [task["id"] for task in queue["waiting"]][:2] == [last["id"], later["id"]]
     for each in (last, later):

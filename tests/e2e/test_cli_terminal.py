@@ -7,18 +7,12 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskState, Wait
-from tests.kit.processes import Stand, stand, wait_until
+from tests.kit.processes import Stand, wait_until
 from tests.kit.terminal import CTRL_C, Terminal, terminal
 
 ESCAPE = b"\x1b"
 COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
 SHOWN_CURSOR, OLD_SCREEN = b"\x1b[?25h", b"\x1b[?1049l"
-
-
-@pytest.fixture(scope="module")
-def there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
-    with stand(tmp_path_factory.mktemp("stand")) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

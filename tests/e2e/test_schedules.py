@@ -9,7 +9,7 @@ import pytest
 
 from mav_tasks import Refused, SyncClient
 from tests.kit.commands import Done, called, mav_tasks
-from tests.kit.processes import Stand, stand
+from tests.kit.processes import Stand
 
 WAY = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t0\t0\t0\t1
@@ -18,12 +18,6 @@ WAY = """QGC WPL 110
 
 
 # commands
-
-
-@pytest.fixture(scope="module")
-def there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
-    with stand(tmp_path_factory.mktemp("stand")) as running:
-        yield running
 
 
 @pytest.fixture

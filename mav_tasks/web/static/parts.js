@@ -5,17 +5,16 @@ import { h } from "./dom.js";
 const WIDE = 1e6; // a bound beyond this tells nothing
 const NUMBERS = ["number", "integer"];
 
-/** Return a field for each part, filled with what each is now. */
+/** Return an element with a field for each part, filled with what each is now. */
 export function fieldsOf(parts, was = {}) {
-  return parts.map((part) => field(part, was[part.name] ?? ""));
+  return h("div", { class: "fields" }, ...parts.map((part) => field(part, was[part.name] ?? "")));
 }
 
 /** Return the parts that were filled in, or changed from what each was; a number that was emptied is 0. */
-export function filledIn(form, parts, was = {}) {
-  const data = new FormData(form);
+export function filledIn(fields, parts, was = {}) {
   const values = {};
   for (const { name, type } of parts) {
-    const text = String(data.get(name) ?? "").trim();
+    const text = fields.querySelector(`[name=${name}]`).value.trim();
     if (text !== String(was[name] ?? "").trim()) values[name] = valueOf(name, type, text);
   }
   return values;

@@ -63,14 +63,15 @@ async function open(file) {
   extra("fence", `its fence (${counted(plan.fence.length, "shape")})`, plan.fence.length, "It replaces the present fence; a driving rover stops at it.");
   extra("rally", `its rally points (${plan.rally.length})`, plan.rally.length, "They replace the present ones.");
   const terms = ["label", "priority"].map(termOf);
+  const fields = fieldsOf(terms, { label: shortened(file.name) });
   const form = ask({
     title: plan.items ? `Queue this plan for rover ${vehicle}?` : `Set this for rover ${vehicle}?`, words, word: plan.items ? "Queue the plan" : "Set it", isBeside: true,
-    fields: h("div", {}, ...parts, plan.items ? h("div", { class: "fields" }, ...fieldsOf(terms, { label: shortened(file.name) })) : null),
+    fields: h("div", {}, ...parts, plan.items ? fields : null),
     act: async (filled) => {
       const data = new FormData(filled);
       const body = { name: file.name, text };
       for (const part of ["fence", "rally"]) if (data.get(part)) await request("PUT", `/vehicles/${vehicle}/${part}`, body);
-      if (plan.items) await post(`/vehicles/${vehicle}/missions`, { ...body, ...filledIn(filled, terms) }, { key });
+      if (plan.items) await post(`/vehicles/${vehicle}/missions`, { ...body, ...filledIn(fields, terms) }, { key });
       loadGround();
     },
     onClose: () => preview(null),

@@ -16,7 +16,7 @@ export function openTaskForm(vehicle, goal = {}) {
   const kinds = state.session.goals;
   const select = h("select", { name: "kind" }, ...kinds.map((kind) => h("option", { value: kind.kind, selected: kind.kind === goal.kind }, kind.title)));
   const meaning = h("small");
-  const numbers = h("div", { class: "fields" });
+  const numbers = h("div"), terms = fieldsOf(state.session.terms);
   let defaults = {};
   const kindOf = () => kinds.find((each) => each.kind === select.value);
   const fill = () => {
@@ -25,7 +25,7 @@ export function openTaskForm(vehicle, goal = {}) {
   const draw = () => {
     const kind = kindOf();
     meaning.textContent = kind.meaning;
-    numbers.replaceChildren(...fieldsOf(kind.numbers, goal));
+    numbers.replaceChildren(fieldsOf(kind.numbers, goal));
     fill();
   };
   select.addEventListener("change", draw);
@@ -40,11 +40,11 @@ export function openTaskForm(vehicle, goal = {}) {
   ask({
     title: isOne ? `Add a task for rover ${vehicle}` : "Add a task",
     words: [...(isOne ? [] : [h("label", { class: "fields" }, "Who ", who)]), h("label", { class: "fields" }, "What ", select), meaning],
-    fields: h("div", {}, numbers, h("div", { class: "fields" }, ...fieldsOf(state.session.terms)), consequence),
+    fields: h("div", {}, numbers, terms, consequence),
     word: "Add the task",
-    act: async (form) => {
-      const goals = [{ kind: kindOf().kind, ...filledIn(form, kindOf().numbers) }];
-      const task = await post(`/vehicles/${who.value}/tasks`, { goals, ...filledIn(form, state.session.terms) }, { key: keys[who.value] });
+    act: async () => {
+      const goals = [{ kind: kindOf().kind, ...filledIn(numbers, kindOf().numbers) }];
+      const task = await post(`/vehicles/${who.value}/tasks`, { goals, ...filledIn(terms, state.session.terms) }, { key: keys[who.value] });
       if (isAny()) choose(task.vehicle);
     },
   });
@@ -52,12 +52,13 @@ export function openTaskForm(vehicle, goal = {}) {
 
 /** Open the form that changes the terms of a task that waits. */
 export function openChangeForm(task) {
-  const { terms } = state.session;
+  const { changes } = state.session;
+  const fields = fieldsOf(changes, task);
   ask({
-    title: `Change task ${task.id}?`, words: [taskName(task)],
-    fields: h("div", { class: "fields" }, ...fieldsOf(terms, task)), word: "Change it",
-    act: async (form) => {
-      await request("PATCH", `/tasks/${task.id}`, filledIn(form, terms, task));
+    title: `Change task ${task.id}?`, words: [taskName(task), "A field that you leave as it is changes nothing."],
+    fields, word: "Change it",
+    act: async () => {
+      await request("PATCH", `/tasks/${task.id}`, filledIn(fields, changes, task));
       change("route"); // its journal has grown
     },
   });

@@ -11,6 +11,8 @@ from mav_tasks.cli.commands import COMMANDS
 from mav_tasks.cli.lazy import LazyCommand
 from mav_tasks.client.asking import parts_of
 from mav_tasks.client.operations import OPERATIONS
+from mav_tasks.client.terms import OF_CHANGES
+from mav_tasks.kinds.plugged import TAKEN
 from mav_tasks.web.application import operations_of
 from mav_tasks.web.openapi import document_of
 
@@ -28,7 +30,7 @@ METHOD = """    async def honk(
 
     async def pause("""
 TERM = """    urgency: Annotated[int | None, Number(0, 9), "how urgent", TaskProperty.PRIORITY]
-    preemptible: Annotated["""
+    every: Annotated["""
 SCRIPT = """
 from unittest.mock import MagicMock
 from mav_tasks import __file__ as where
@@ -62,6 +64,7 @@ for arguments in (["--help"], ["honk", "--help"], ["honk", "--priority", "11"], 
 def test_each_surface_has_each_operation_or_a_reason() -> None:
     paths = document_of(operations_of(MagicMock()))["paths"]
     tools = {tool.name: tool for tool in driving("")}
+    assert OF_CHANGES.keys() < {*TAKEN}
     commands = {each.name: each for each in COMMANDS if isinstance(each, LazyCommand)}
     for command in commands.values():
         assert command.load().help.partition("\n")[0] == command.help
@@ -91,7 +94,7 @@ def test_a_new_operation_is_one_row_and_its_method_and_a_new_term_one_line(tmp_p
     for name, before, after in (
         ("operations.py", "OPERATIONS = (\n", ROW),
         ("aio.py", "    async def pause(", METHOD),
-        ("terms.py", "    preemptible: Annotated[", TERM),
+        ("terms.py", "    every: Annotated[", TERM),
     ):
         path = copy / "client" / name
         text = path.read_text(encoding="utf-8")
