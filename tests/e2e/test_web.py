@@ -102,10 +102,11 @@ def test_answers_are_as_the_document_says(page: Web, check: Check) -> None:
 def test_one_key_makes_one_task(page: Web) -> None:
     body = {"goals": [{"kind": "wait", "duration": 900}], "label": "once"}
     first = page.post("/vehicles/1/tasks", body, idempotency_key="a key")
-    again = page.post("/vehicles/1/tasks", body, idempotency_key="a key")
+    same = body | {"priority": 5, "delay": 0, "every": 0}
+    again = page.post("/vehicles/1/tasks", same, idempotency_key="a key")
     assert first["id"] == again["id"]
-    for other in (body | {"label": "twice"}, body | {"priority": 6}):
-        refused = page.send("POST", "/vehicles/1/tasks", other, idempotency_key="a key")
+    for other in ({"label": "twice"}, {"priority": 6}, {"every": 60}):
+        refused = page.send("POST", "/vehicles/1/tasks", body | other, idempotency_key="a key")
         assert refused.status_code == 409
         assert refused.json()["reason"] == "nonce_reused"
     second = page.post("/vehicles/1/tasks", body, idempotency_key="another key")

@@ -57,6 +57,9 @@ submit act servo --param1 two: param1 'two': not a number
 submit act servo --param5 1.5: param5 1.5: not a whole number
 submit act servo --time-limit 11m: time_limit 660.0: not in 0.1..600 s
 submit move 1 --every 5w: 30s, 5m or 1h30m
+submit wait 9 --deadline 5w: --deadline 5w
+submit wait 9 --in 400d: --in 400d
+submit move 1 --priority 11: --priority 11
 modify 3: --priority
 release perhaps: again, remainder or skip
 release x again: id of a task
