@@ -144,7 +144,8 @@ CRON = Part(
     " empty: do not",
 )
 #: all parts of these requests
-NEW, CHANGES = (*OF_NEW.values(), CRON), (*OF_CHANGES.values(), CRON)
+NEW = (*OF_NEW.values(), CRON)
+CHANGES = (*NEW, *(part for name, part in OF_CHANGES.items() if name not in OF_NEW))
 
 
 def given(terms: CommonTerms | Changes, known: Mapping[str, Part]) -> dict[str, Any]:
