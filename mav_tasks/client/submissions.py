@@ -5,7 +5,7 @@ from random import SystemRandom
 
 from mav_tasks.basics.latest import keep_latest
 from mav_tasks.client import wire
-from mav_tasks.tasks.task import MAX_NONCE
+from mav_tasks.tasks.task import MAX_DELAY, MAX_NONCE
 
 LATE_ACK = 3.0  # s for which a copy of an ack may still arrive
 REMEMBERED_IDS = 10_000
@@ -49,12 +49,15 @@ class Submissions:
         """Return the start delay, s. For ``at`` it bridges the time until START_UTC is set.
 
         The same nonce gets the same delay: with another one the server would see another task.
+        Raise ValueError for a time that is too far ahead.
         """
         if at is None:
             return delay
         known = self._delays.get(nonce)
         if known is None:
             known = max(delay, utc_of(at) - datetime.now(UTC).timestamp(), 0.0)
+            if known > MAX_DELAY:
+                raise ValueError(f"at {at}: more than a year ahead")
             keep_latest(self._delays, nonce, known, most=REMEMBERED_DELAYS)
         return known
 

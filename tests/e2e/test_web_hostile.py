@@ -43,6 +43,7 @@ POST /vehicles/1/tasks {"goals": [{"kind": "goto", "north": 1e38, "east": 0}]} =
 POST /vehicles/1/tasks {"goals": [{"kind": "home", "\ud800": 1}]} => \ud800
 POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "label": "\ud800"} => label
 POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "preemptive": true} => preemptive: unknown
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "2100-01-01T00:00Z"} => a year ahead
 PUT /vehicles/1/fence {"circle": {"latitude": HUGE, "longitude": 1, "radius": 1}} => circle.latitude
 POST /vehicles/1/resume {"epoch": 1, "epoch": 2} => epoch: it comes twice
 POST /vehicles/1/tasks MOVE 1, "kind": "home"}]} => kind: it comes twice
