@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from inspect import Parameter
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli.parts import parameter_of, value_of
 from mav_tasks.cli.times import parse_duration, parse_moment
-from mav_tasks.client.terms import OF_CHANGES, OF_NEW, Changes, CommonTerms
+from mav_tasks.client.terms import OF_CHANGES, OF_NEW
 from mav_tasks.config.setting_keys.parts import Part
 from mav_tasks.config.setting_keys.shapes import Text
 from mav_tasks.tasks.task import MAX_PRIORITY
@@ -53,7 +53,11 @@ class _Typed:
         """Return the options, for ``command``."""
         return [parameter_of(PARTS[name], key=name, metavar=METAVARS.get(name)) for name in cls.of]
 
-    def _read(self) -> dict[str, Any]:
+    def read(self) -> Any:
+        """Return the terms that are given, as the library takes them.
+
+        Raise UsageError or SettingError if one is invalid.
+        """
         if {"delay", "at"} <= self._typed.keys():
             raise UsageError("--in and --at: choose one of them")
         return {name: _read(name, text) for name, text in self._typed.items()}
@@ -64,19 +68,11 @@ class NewTerms(_Typed):
 
     of = OF_NEW
 
-    def read(self) -> CommonTerms:
-        """Return the terms that are given. Raise UsageError or SettingError if one is invalid."""
-        return cast("CommonTerms", self._read())
-
 
 class ChangedTerms(_Typed):
     """The options for what is to be changed of that."""
 
     of = OF_CHANGES
-
-    def read(self) -> Changes:
-        """Return the changes that are given. Raise UsageError or SettingError if one is invalid."""
-        return cast("Changes", self._read())
 
 
 def _read(name: str, text: str | bool) -> Any:
