@@ -67,9 +67,10 @@ def main() -> None:
         print("goto", sorted({(ack["result"], ack["result_param2"]) for ack in acks}))
 
         here.attempt(raw.upload_mission, raw_items(home))
-        # a try that failed for loss has an ack of its own, without an id
-        wait_for(lambda: any(ack["opaque_id"] for ack in heard["MISSION_ACK"]), "the mission's ack")
-        mission_id = max(ack["opaque_id"] for ack in heard["MISSION_ACK"])
+        # a try that failed for loss has an ack of its own, with the reason in place of the id
+        acks = heard["MISSION_ACK"]
+        wait_for(lambda: any(ack["opaque_id"] > ack["type"] == 0 for ack in acks), "the ack")
+        mission_id = max(ack["opaque_id"] for ack in acks if not ack["type"])
         wait_for(
             lambda: (
                 heard["MISSION_CURRENT"]

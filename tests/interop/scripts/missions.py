@@ -51,7 +51,8 @@ def mission(here: Circumstances, system: Any, home: Any) -> None:
 
 def actions(here: Circumstances, system: Any, telemetry: Any, home: Any) -> None:
     action = Action(system)
-    place = (home.latitude_deg + 7 / METRES, home.longitude_deg, 0.0, NAN)
+    # so far that it still drives when an answer has come through at last
+    place = (home.latitude_deg + 30 / METRES, home.longitude_deg, 0.0, NAN)
     here.attempt(action.goto_location, *place)
     wait_for_motion(telemetry, moves=True)
     here.attempt(action.hold)
