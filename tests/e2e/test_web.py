@@ -235,7 +235,7 @@ POST /vehicles/1/tasks {} 422 goals: missing
 POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "delay": true} 422 delay True
 POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "noon"} 422 expected a time such as
 POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "2099-01-01T10:00"} 422 a time zone
-POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "2099-01-01T10:00Z"} 422 start delay
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "2099-01-01T10:00Z"} 422 a year ahead
 POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "every": 60, "cron": "* * * * *"} 422 every and
 POST /vehicles/9/pause {} 404 no rover 9; the server has: 1
 POST /vehicles/1/resume {} 422 epoch: missing
