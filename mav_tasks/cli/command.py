@@ -76,7 +76,7 @@ def _spread(body: Callable[..., Any]) -> list[inspect.Parameter]:
 
 
 def _options_of(group: Any) -> list[inspect.Parameter]:
-    """Return the options of a group; [] if it is none."""
+    """Return the options of a group; an empty list for any other type."""
     if hasattr(group, "parameters"):
         return list(group.parameters())
     if not dataclasses.is_dataclass(group):
