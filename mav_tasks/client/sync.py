@@ -1,6 +1,6 @@
 """The blocking client: the calls of the asyncio client, each waiting for its answer.
 
-Made by tools/sync_client.py: change aio.py, handle.py or blocking.py instead.
+Made by tools/generate: change aio.py, handle.py or blocking.py instead.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,7 @@
 """The states of a task and every transition between them, as one table.
 
 A transition that TRANSITIONS lacks is a bug and raises. A task in a TERMINAL state never changes
-again. ``tools/state_diagram.py`` draws this table into ``mav_tasks/README.md``. The numbers are
+again. ``tools/generate`` draws this table into ``mav_tasks/README.md``. The numbers are
 those of the dialect's TASK_STATE and TASK_REASON.
 """
 

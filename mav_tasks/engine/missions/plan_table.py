@@ -2,7 +2,7 @@
 
 It is driven, or sent to the vehicle at its place, or skipped, as autopilots do that store what they
 cannot do; or the plan is refused, because it would be unsafe or mean nothing. A command without a
-row of its own is treated by its kind in the policy table. tools/plan_table.py prints all of it to
+row of its own is treated by its kind in the policy table. tools/generate prints all of it to
 dialects/README.md.
 """
 

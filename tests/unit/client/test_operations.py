@@ -102,7 +102,7 @@ def test_a_new_operation_is_one_row_and_its_method_and_a_new_term_one_line(tmp_p
         path.write_text(text.replace(before, after), encoding="utf-8")
     environment = {"PYTHONPATH": str(tmp_path), "PATH": str(Path(sys.executable).parent)}
     said = ""
-    for arguments in (("tools/sync_client.py",), ("-c", SCRIPT.format(copy=str(copy)))):
+    for arguments in (("tools/generate", "blocking client"), ("-c", SCRIPT.format(copy=str(copy)))):
         ran = subprocess.run(
             [sys.executable, *arguments],
             cwd=tmp_path,

@@ -23,7 +23,7 @@ SCRIPT = """
 import sys
 from dataclasses import asdict
 from math import radians
-from parameter_table import table
+from generators.parameter_table import table
 from mav_tasks import __file__ as where
 from mav_tasks.cli.app import app
 from mav_tasks.config.configuration import Sources

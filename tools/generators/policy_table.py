@@ -1,14 +1,9 @@
-"""Print the policy table into dialects/README.md, and who may do what into the guide.
+"""The policy table of dialects/README.md, and the guide's table of who may do what."""
 
-`--check` reports whether one of them is outdated.
-"""
-
-import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain
 
-from generated import keep_current
 from mav_tasks.config.settings import ROLES
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.policy import commands as of_commands
@@ -113,9 +108,3 @@ def _way(row: Row) -> str:
     if not row.passes_beside_task:
         return "not during STOP or a task"
     return "always" if row.passes_under_stop else "not during STOP"
-
-
-if __name__ == "__main__":
-    wire = keep_current("dialects/README.md", "policy table", "policy_table.py", table())
-    guide = keep_current("mav_tasks/GUIDE.md", "table of rights", "policy_table.py", rights())
-    sys.exit(wire or guide)

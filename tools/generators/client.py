@@ -1,4 +1,4 @@
-"""Make mav_tasks/client/sync.py from the asyncio client; `--check` reports whether it is outdated.
+"""The blocking client, mav_tasks/client/sync.py, made from the asyncio one.
 
 Each public call of ``Client`` and ``Task`` becomes one of ``SyncClient`` and ``SyncTask``, with its
 signature and docstring, for editors and mypy. ``mav_tasks/client/blocking.py`` has the rest.
@@ -8,10 +8,10 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from textwrap import indent
 
-from generated import ROOT, keep_file_current
-
+ROOT = Path(__file__).resolve().parents[2]
 SYNC = "mav_tasks/client/sync.py"
 #: (module, class) -> its calls that stay with the asyncio client, or are in blocking.py
 LEFT_OUT: Mapping[tuple[str, str], frozenset[str]] = {
@@ -21,7 +21,7 @@ LEFT_OUT: Mapping[tuple[str, str], frozenset[str]] = {
 OPENING = {"open": "_begin", "close": "_end"}
 HEADER = '''"""The blocking client: the calls of the asyncio client, each waiting for its answer.
 
-Made by tools/sync_client.py: change aio.py, handle.py or blocking.py instead.
+Made by tools/generate: change aio.py, handle.py or blocking.py instead.
 """
 
 '''
@@ -29,7 +29,7 @@ OF_LOOP = "Use a client only on the event loop on which it was opened."
 OF_PORTAL = "It is open within a ``with`` block. ``portal`` runs its asyncio part."
 
 
-def made() -> str:
+def module() -> str:
     """Return the text of the blocking client."""
     sources = {name: _parsed(name) for name, _ in LEFT_OUT}
     classes = "\n\n".join(
@@ -142,7 +142,3 @@ def _formatted(text: str) -> str:
         )
         text = done.stdout
     return text
-
-
-if __name__ == "__main__":
-    sys.exit(keep_file_current(SYNC, "blocking client", "sync_client.py", made()))

@@ -1,11 +1,5 @@
-"""Print what becomes of each command in a plan into dialects/README.md.
+"""The table of dialects/README.md of what becomes of each command in a plan."""
 
-`--check` reports whether it is outdated.
-"""
-
-import sys
-
-from generated import keep_current
 from mav_tasks.engine.missions.plan_table import PlanRow, name_of, row_of_item
 from mav_tasks.engine.policy.commands import COMMANDS
 
@@ -22,7 +16,3 @@ def table() -> str:
     for row, commands in sorted(groups.items(), key=lambda pair: USES.index(pair[0].use)):
         lines.append(f"| {', '.join(map(name_of, commands))} | {' | '.join(row)} |")
     return "\n".join([*lines, ""])
-
-
-if __name__ == "__main__":
-    sys.exit(keep_current("dialects/README.md", "table of plans", "plan_table.py", table()))

@@ -4,7 +4,7 @@ from pathlib import Path
 from runpy import run_path
 
 TOOLS = Path(__file__).resolve().parents[3] / "tools"
-with_links = run_path(str(TOOLS / "hatch_readme.py"))["with_links"]
+with_links = run_path(str(TOOLS / "hatch.py"))["with_links"]
 
 TEXT = "See [the guide](mav_tasks/GUIDE.md#keys) and [SemVer](https://semver.org), [below](#x).\n"
 

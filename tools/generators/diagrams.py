@@ -1,26 +1,12 @@
-"""Draw the states of a rover's queue, from the control table, into mav_tasks/README.md.
+"""The state diagrams of mav_tasks/README.md: of a task, and of a rover's queue."""
 
-`--check` reports whether the diagram is outdated.
-"""
-
-import sys
 from itertools import product
-from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
-
-from generated import keep_current  # noqa: E402
-from mav_tasks.engine.vehicles.control import (  # noqa: E402
-    Event,
-    Grip,
-    Queue,
-    State,
-    Work,
-)
-from tests.kit.joint.graph import can_happen, variants  # noqa: E402
-from tests.kit.joint.model import MAKES, happens  # noqa: E402
+from mav_tasks.engine.vehicles.control import Event, Grip, Queue, State, Work
+from mav_tasks.tasks.lifecycle import INITIAL, TERMINAL, TRANSITIONS, TaskState
+from tests.kit.joint.graph import can_happen, variants
+from tests.kit.joint.model import MAKES, happens
 
 NAMES = {
     Queue.RUNS: "runs",
@@ -60,7 +46,29 @@ WORDS = {
 }
 
 
-def edges() -> dict[tuple[Queue, Queue], list[Event]]:
+def of_task() -> str:
+    """Return the lifecycle table as a Mermaid state diagram; KILLED has one line of its own."""
+    lines = ["```mermaid", "stateDiagram-v2"]
+    lines += [f"    [*] --> {_name(state)}" for state in sorted(INITIAL)]
+    for old, edges in TRANSITIONS.items():
+        lines += [
+            f"    {_name(old)} --> {_name(new)}: {why}"
+            for new, why in edges.items()
+            if new is not TaskState.KILLED
+        ]
+    killable = ", ".join(
+        _name(old) for old, edges in TRANSITIONS.items() if TaskState.KILLED in edges
+    )
+    lines += [f"    {_name(state)} --> [*]" for state in sorted(TERMINAL)]
+    lines += ["```", "", f"`killed` (STOP or kill) is reached from: {killable}.", ""]
+    return "\n".join(lines)
+
+
+def _name(state: TaskState) -> str:
+    return state.name.lower()
+
+
+def _edges() -> dict[tuple[Queue, Queue], list[Event]]:
     """Return the events that lead from each state of the queue to another."""
     found: dict[tuple[Queue, Queue], list[Event]] = {}
     for make, queue, grip, work in product(MAKES, Queue, Grip, Work):
@@ -77,18 +85,13 @@ def edges() -> dict[tuple[Queue, Queue], list[Event]]:
     return {pair: sorted(events, key=list(Event).index) for pair, events in found.items() if events}
 
 
-def diagram() -> str:
-    """Return the states and transitions as a Mermaid state diagram."""
+def of_queue() -> str:
+    """Return the states of a queue, from the control table, as a Mermaid state diagram."""
     lines = ["```mermaid", "stateDiagram-v2", "    [*] --> runs"]
     lines += [f"    {NAMES[queue]}: {NAMES[queue]}, {note}" for queue, note in NOTES.items()]
-    for (old, new), events in edges().items():
+    for (old, new), events in _edges().items():
         words = ", ".join(
             WORDS.get(event, event.name.lower().replace("_", " ")) for event in events
         )
         lines.append(f"    {NAMES[old]} --> {NAMES[new]}: {words}")
     return "\n".join([*lines, "```", ""])
-
-
-if __name__ == "__main__":
-    document = "mav_tasks/README.md"
-    sys.exit(keep_current(document, "control diagram", "control_diagram.py", diagram()))

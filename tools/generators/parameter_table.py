@@ -1,8 +1,5 @@
-"""Print the table of parameters into dialects/README.md; `--check` reports if it is outdated."""
+"""The table of parameters of dialects/README.md."""
 
-import sys
-
-from generated import keep_current
 from mav_tasks.config.parameter_table import NAMES, PARAMETERS, Parameter
 
 HEAD = "| parameter | key | range | unit | what it sets |\n|---|---|---|---|---|\n"
@@ -22,8 +19,3 @@ def _row(parameter: Parameter) -> str:
     unit = key.shape.unit.replace("s2", "s²")
     limits = f"{parameter.low:.7g}..{parameter.high:.7g}"
     return f"| {parameter.name} | `{key.name}` | {limits} | {unit} | {about} |\n"
-
-
-if __name__ == "__main__":
-    made = table()
-    sys.exit(keep_current("dialects/README.md", "parameter table", "parameter_table.py", made))
