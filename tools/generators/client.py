@@ -18,6 +18,7 @@ LEFT_OUT: Mapping[tuple[str, str], frozenset[str]] = {
     ("handle", "Task"): frozenset({"done", "wake", "close"}),
     ("aio", "Client"): frozenset({"vehicle", "rearm", "streaming", "listening", "some_vehicles"}),
 }
+OF_BLOCKING = ("BlockingClient", "BlockingTask", "Portal", "called")
 OPENING = {"open": "_begin", "close": "_end"}
 HEADER = '''"""The blocking client: the calls of the asyncio client, each waiting for its answer.
 
@@ -36,7 +37,7 @@ def module() -> str:
         _class(next(_classes(sources[module], name)), left_out)
         for (module, name), left_out in LEFT_OUT.items()
     )
-    return _formatted(f"{HEADER}{_imports(classes, sources)}\n\n{classes}")
+    return _formatted(f"{HEADER}{_imports(sources)}\n\n{classes}")
 
 
 def _parsed(module: str) -> ast.Module:
@@ -117,28 +118,21 @@ def _arguments(call: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
     return ", ".join(arguments)
 
 
-def _imports(code: str, sources: Mapping[str, ast.Module]) -> str:
-    """Return the imports of the names in the code, from the same modules as in the sources."""
-    homes = dict.fromkeys(("BlockingClient", "BlockingTask", "Portal"), "mav_tasks.client.blocking")
-    homes |= {"called": "mav_tasks.client.blocking"}
-    homes["Iterator"] = "collections.abc"
-    for module, source in sources.items():
+def _imports(sources: Mapping[str, ast.Module]) -> str:
+    """Return the imports of the sources, and of their own names; unused ones go when formatted."""
+    lines = ["from collections.abc import Iterator", "from mav_tasks.client.aio import Client"]
+    lines += [f"from mav_tasks.client.blocking import {name}" for name in OF_BLOCKING]
+    for name, source in sources.items():
         for node in source.body:
-            if isinstance(node, ast.ImportFrom) and node.module is not None:
-                homes |= {alias.name: node.module for alias in node.names}
+            if isinstance(node, ast.ImportFrom):
+                lines += [f"from {node.module} import {alias.name}" for alias in node.names]
             elif isinstance(node, ast.Assign):
-                names = [each.id for each in node.targets if isinstance(each, ast.Name)]
-                homes |= dict.fromkeys(names, f"mav_tasks.client.{module}")
-    homes["Client"] = "mav_tasks.client.aio"
-    used = {node.id for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Name)}
-    return "\n".join(f"from {homes[name]} import {name}" for name in sorted(used & homes.keys()))
+                lines.append(f"from mav_tasks.client.{name} import {ast.unparse(node.targets[0])}")
+    return "\n".join(lines)
 
 
 def _formatted(text: str) -> str:
-    for step in (("check", "--select=I", "--fix", "--quiet"), ("format",)):
-        command = [sys.executable, "-m", "ruff", *step, "--stdin-filename", SYNC, "-"]
-        done = subprocess.run(
-            command, input=text, capture_output=True, text=True, check=True, cwd=ROOT
-        )
-        text = done.stdout
+    for step in ("check --select=F401,F811 --fix -q", "check --select=I --fix -q", "format"):
+        command = [sys.executable, "-m", "ruff", *step.split(), "--stdin-filename", SYNC, "-"]
+        text = subprocess.check_output(command, input=text, text=True, cwd=ROOT)
     return text
