@@ -7,19 +7,18 @@ signature and docstring, for editors and mypy. ``mav_tasks/client/blocking.py`` 
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import indent
 
-ROOT = Path(__file__).resolve().parents[2]
-SYNC = "mav_tasks/client/sync.py"
+CLIENT = Path(__file__).resolve().parents[2] / "mav_tasks" / "client"
 #: (module, class) -> its calls that stay with the asyncio client, or are in blocking.py
-LEFT_OUT: Mapping[tuple[str, str], frozenset[str]] = {
-    ("handle", "Task"): frozenset({"done", "wake", "close"}),
-    ("aio", "Client"): frozenset({"vehicle", "rearm", "streaming", "listening", "some_vehicles"}),
+LEFT_OUT = {
+    ("handle", "Task"): {"done", "wake", "close"},
+    ("aio", "Client"): {"vehicle", "rearm", "streaming", "listening", "some_vehicles"},
 }
 OF_BLOCKING = ("BlockingClient", "BlockingTask", "Portal", "called")
-OPENING = {"open": "_begin", "close": "_end"}
+OPENING = {"open": "_begin", "close": "_end"}  # of the client
 HEADER = '''"""The blocking client: the calls of the asyncio client, each waiting for its answer.
 
 Made by tools/generate: change aio.py, handle.py or blocking.py instead.
@@ -29,89 +28,67 @@ Made by tools/generate: change aio.py, handle.py or blocking.py instead.
 OF_LOOP = "Use a client only on the event loop on which it was opened."
 OF_PORTAL = "It is open within a ``with`` block. ``portal`` runs its asyncio part."
 
+Call = ast.FunctionDef | ast.AsyncFunctionDef
+
 
 def module() -> str:
     """Return the text of the blocking client."""
-    sources = {name: _parsed(name) for name, _ in LEFT_OUT}
-    classes = "\n\n".join(
-        _class(next(_classes(sources[module], name)), left_out)
-        for (module, name), left_out in LEFT_OUT.items()
-    )
-    return _formatted(f"{HEADER}{_imports(sources)}\n\n{classes}")
+    sources = {name: ast.parse((CLIENT / f"{name}.py").read_text("utf-8")) for name, _ in LEFT_OUT}
+    classes = [
+        _class(kind, LEFT_OUT[name, kind.name])
+        for name, source in sources.items()
+        for kind in source.body
+        if isinstance(kind, ast.ClassDef) and (name, kind.name) in LEFT_OUT
+    ]
+    return _formatted("\n\n".join([HEADER + _imports(sources), *classes]))
 
 
-def _parsed(module: str) -> ast.Module:
-    path = ROOT / "mav_tasks" / "client" / f"{module}.py"
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-def _classes(module: ast.Module, name: str) -> Iterator[ast.ClassDef]:
-    return (each for each in module.body if isinstance(each, ast.ClassDef) and each.name == name)
-
-
-def _class(kind: ast.ClassDef, left_out: frozenset[str]) -> str:
+def _class(kind: ast.ClassDef, left_out: set[str]) -> str:
     text = f"class Sync{kind.name}(Blocking{kind.name}):\n{_docstring(kind)}\n"
     for call in kind.body:
-        if not isinstance(call, ast.FunctionDef | ast.AsyncFunctionDef):
+        if not isinstance(call, Call):
             continue
         if call.name == "__init__" and kind.name == "Client":
-            text += _constructor(call)
+            made = f"super().__init__(lambda: Client({_arguments(call)}), portal)"
+            parameters = f"{ast.unparse(call.args)}, portal: Portal | None = None"
+            text += f"\n    def __init__({parameters}) -> None:\n        {made}\n"
         elif not call.name.startswith("_") and call.name not in left_out:
-            text += _call(call, kind.name)
+            text += _call(call)
     return text
 
 
-def _constructor(call: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
-    parameters = f"{_parameters(call, '')}, portal: Portal | None = None"
-    made = f"lambda: Client({_arguments(call)})"
-    return f"\n    def __init__({parameters}) -> None:\n        super().__init__({made}, portal)\n"
-
-
-def _call(call: ast.FunctionDef | ast.AsyncFunctionDef, kind: str) -> str:
-    returns = _annotation(call.returns, kind).replace("AsyncIterator", "Iterator")
+def _call(call: Call) -> str:
+    assert call.returns
+    returns = ast.unparse(call.returns).replace("AsyncIterator", "Iterator")
     asked = f"self._aio.{call.name}({_arguments(call)})"
     decorator = ""
-    if kind == "Client" and call.name in OPENING:
+    if call.name in OPENING:
         body = f"self.{OPENING[call.name]}()"
     elif call.decorator_list:
         decorator, body = "    @property\n", f"return self._aio.{call.name}"
     elif isinstance(call, ast.FunctionDef):
         function = f"lambda: {asked}" if _arguments(call) else f"self._aio.{call.name}"
-        body = f"{'' if returns == 'None' else 'return '}self._call(called({function}))"
+        body = f"return self._call(called({function}))"
     elif returns.startswith("Iterator"):
         body = f"return self._each({asked})"
-    elif returns == "SyncTask":
-        body = f"return self._handle(SyncTask, {asked})"
+    elif returns == "Task":
+        returns, body = "SyncTask", f"return self._handle(SyncTask, {asked})"
     else:
-        body = f"{'' if returns == 'None' else 'return '}self._call({asked})"
-    head = f"{decorator}    def {call.name}({_parameters(call, kind)}) -> {returns}:\n"
+        body = f"return self._call({asked})"
+    if returns == "None":
+        body = body.removeprefix("return ")
+    head = f"{decorator}    def {call.name}({ast.unparse(call.args)}) -> {returns}:\n"
     return f"\n{head}{indent(_docstring(call), '    ')}\n        {body}\n"
 
 
-def _docstring(node: ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> str:
+def _docstring(node: ast.ClassDef | Call) -> str:
     text = ast.get_docstring(node) or ""
     text = text.replace(OF_LOOP, OF_PORTAL).replace("``Client", "``SyncClient")
     end = "\n" if "\n" in text else ""
     return indent(f'"""{text}{end}"""', "    ")
 
 
-def _parameters(call: ast.FunctionDef | ast.AsyncFunctionDef, kind: str) -> str:
-    for each in (*call.args.args, *call.args.kwonlyargs):
-        if each.annotation is not None:
-            each.annotation = ast.Name(_annotation(each.annotation, kind))
-    return ast.unparse(call.args)
-
-
-def _annotation(annotation: ast.expr | None, kind: str) -> str:
-    """Return an annotation of the blocking client; in SyncTask its own name is quoted."""
-    assert annotation is not None
-    text = ast.unparse(annotation).strip("'")
-    words = [f"Sync{word}" if word == "Task" else word for word in text.split(" ")]
-    is_own = kind == "Task" and words != text.split(" ")
-    return f'"{" ".join(words)}"' if is_own else " ".join(words)
-
-
-def _arguments(call: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
+def _arguments(call: Call) -> str:
     arguments = [each.arg for each in call.args.args[1:]]
     arguments += [f"{each.arg}={each.arg}" for each in call.args.kwonlyargs]
     arguments += [f"**{call.args.kwarg.arg}"] if call.args.kwarg else []
@@ -133,6 +110,6 @@ def _imports(sources: Mapping[str, ast.Module]) -> str:
 
 def _formatted(text: str) -> str:
     for step in ("check --select=F401,F811 --fix -q", "check --select=I --fix -q", "format"):
-        command = [sys.executable, "-m", "ruff", *step.split(), "--stdin-filename", SYNC, "-"]
-        text = subprocess.check_output(command, input=text, text=True, cwd=ROOT)
+        command = ["-m", "ruff", *step.split(), "--stdin-filename", CLIENT / "sync.py", "-"]
+        text = subprocess.check_output([sys.executable, *command], input=text, text=True)
     return text
