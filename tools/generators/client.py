@@ -110,6 +110,6 @@ def _imports(sources: Mapping[str, ast.Module]) -> str:
 
 def _formatted(text: str) -> str:
     for step in ("check --select=F401,F811 --fix -q", "check --select=I --fix -q", "format"):
-        command = ["-m", "ruff", *step.split(), "--stdin-filename", CLIENT / "sync.py", "-"]
+        command = ["-m", "ruff", *step.split(), "--stdin-filename", str(CLIENT / "sync.py"), "-"]
         text = subprocess.check_output([sys.executable, *command], input=text, text=True)
     return text
