@@ -28,6 +28,16 @@ NAMES = {Kind.STICKS: "manual", Kind.WISH: "setting", Kind.TELL: "report"}
 MOST_NAMES = 3
 HANDLED = "handled"
 
+LEGEND = """\
+- *handled*: by the server at `(N, 191)`, and at `(N, 1)` if it claims it there (`rules.claim`). The
+  rule after *else* applies at other components of the vehicle, and with `claim` off.
+- *in control*: the client has requested GUIDED or OFFBOARD since the last halt, the vehicle is
+  armed, and every task that has started is over.
+- *during a task*: while the server takes control, drives, or hands the vehicle back.
+- *bound*: can change more than motion.
+- *not counted*: does not count towards the rate limit of requests.
+"""
+
 #: the limits that hold for the commands and messages of a row, by what the row is about
 TASK = "`tasks`, `max_priority`, `max_speed`, `max_distance`, `quota`"
 LIMITS = {
@@ -69,12 +79,25 @@ def short_table() -> str:
 
 
 def full_table() -> str:
-    """Return the tables of kinds, commands and messages; equal rows share one line."""
+    """Return the tables of kinds, commands and messages, and a legend; equal rows share a line."""
     kinds = [f"| {_name(kind)} | {kind.value} |" for kind in KINDS]
     commands = _lines(of_commands.COMMANDS.items(), (*of_commands.BY_WORDS, NAMELESS))
     messages = _lines(of_messages.MESSAGES.items(), (*of_messages.BY_WORDS, NAMELESS))
     parts = ["| kind | a message of this kind |\n|---|---|", *kinds]
-    parts += ["", "Commands:", "", HEAD, *commands, "", "Messages:", "", HEAD, *messages, ""]
+    parts += [
+        "",
+        LEGEND,
+        "Commands:",
+        "",
+        HEAD,
+        *commands,
+        "",
+        "Messages:",
+        "",
+        HEAD,
+        *messages,
+        "",
+    ]
     return "\n".join(parts)
 
 
@@ -123,7 +146,7 @@ def _lines(numbered: Iterable[tuple[int, Row]], others: Iterable[Row]) -> Iterat
 
 def _order(group: Group) -> tuple[bool, int, int, str]:
     row, names = group
-    return (NAMELESS.name in names, KINDS.index(row.kind), ROLES.index(row.role), names[0])
+    return (NAMELESS.name in names, _kind(row), ROLES.index(row.role), names[0])
 
 
 def _name(kind: Kind) -> str:
