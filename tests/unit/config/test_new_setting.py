@@ -23,7 +23,7 @@ SCRIPT = """
 import sys
 from dataclasses import asdict
 from math import radians
-from generators.parameter_table import table
+from generators.tables import parameters
 from mav_tasks import __file__ as where
 from mav_tasks.cli.app import app
 from mav_tasks.config.configuration import Sources
@@ -60,8 +60,8 @@ wanted = KEYS["driving.creep_deg"].put(ServerSettings(), radians(6))
 assert taken(ServerSettings(), wanted) == wanted
 assert list(PARAMETERS)[-1] == "TSK_CREEP"
 assert changed(Settings(), "TSK_CREEP", 7.0).driving == Driving(creep=radians(7))
-row = "TSK_CREEP | `driving.creep_deg` | 1..9 | deg/s | rate of a slow turn; at most TSK_TURN"
-assert f"| {{row}} |\\n" in table()
+row = "TSK_CREEP | 1..9 deg/s | rate of a slow turn; at most TSK_TURN"
+assert f"| {{row}} |\\n" in parameters()
 record = asdict(Settings(driving=Driving(creep=radians(8))))
 assert settings_of(record).driving.creep == radians(8)
 del record["driving"]["creep"]  # an older record
