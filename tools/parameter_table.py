@@ -1,11 +1,12 @@
-"""Print the table of parameters into dialects/README.md; `--check` reports if it is outdated."""
+"""Write the table of parameters into the wire contract; `--check` reports if it is outdated."""
 
 import sys
 
 from generated import keep_current
 from mav_tasks.config.parameter_table import NAMES, PARAMETERS, Parameter
 
-HEAD = "| parameter | key | range | unit | what it sets |\n|---|---|---|---|---|\n"
+CONTRACT = "dialects/parameters.md"
+HEAD = "| parameter | range | what it sets |\n|---|---|---|\n"
 
 
 def table() -> str:
@@ -20,10 +21,9 @@ def _row(parameter: Parameter) -> str:
         numbered = enumerate(parameter.choices)
         about += f": {', '.join(f'{number} {word}' for number, word in numbered)}"
     unit = key.shape.unit.replace("s2", "s²")
-    limits = f"{parameter.low:.7g}..{parameter.high:.7g}"
-    return f"| {parameter.name} | `{key.name}` | {limits} | {unit} | {about} |\n"
+    limits = f"{parameter.low:.7g}..{parameter.high:.7g} {unit}".strip()
+    return f"| {parameter.name} | {limits} | {about} |\n"
 
 
 if __name__ == "__main__":
-    made = table()
-    sys.exit(keep_current("dialects/README.md", "parameter table", "parameter_table.py", made))
+    sys.exit(keep_current(CONTRACT, "parameter table", "parameter_table.py", table()))

@@ -1,6 +1,6 @@
-"""Print the policy table into dialects/README.md, and who may do what into the guide.
+"""Write the policy table into the wire contract, and who may do what into the guide.
 
-`--check` reports whether one of them is outdated.
+`--check` reports whether one of them is outdated. ``full_table`` lists every command and message.
 """
 
 import sys
@@ -15,12 +15,28 @@ from mav_tasks.engine.policy import commands as of_commands
 from mav_tasks.engine.policy import messages as of_messages
 from mav_tasks.engine.policy.commands import UNKNOWN
 
+#: the documents of ``short_table`` and ``rights``
+CONTRACT, GUIDE = "dialects/rights.md", "mav_tasks/GUIDE.md"
+
 KINDS = list(Kind)
 QUIET = (Kind.QUESTION, Kind.TELL)  # they change nothing
 HEAD = "| kind | lowest role | purpose | forwarded | commands or messages |\n|---|---|---|---|---|"
 NAMELESS = replace(UNKNOWN, name="all others")
 #: kinds that have a plainer name in the document
 NAMES = {Kind.STICKS: "manual", Kind.WISH: "setting", Kind.TELL: "report"}
+#: a row of the short table names so many, else it says what they do
+MOST_NAMES = 3
+HANDLED = "handled"
+
+LEGEND = """\
+- *handled*: by the server at `(N, 191)`, and at `(N, 1)` if it claims it there (`rules.claim`). The
+  rule after *else* applies at other components of the vehicle, and with `claim` off.
+- *in control*: the client has requested GUIDED or OFFBOARD since the last halt, the vehicle is
+  armed, and every task that has started is over.
+- *during a task*: while the server takes control, drives, or hands the vehicle back.
+- *bound*: can change more than motion.
+- *not counted*: does not count towards the rate limit of requests.
+"""
 
 #: the limits that hold for the commands and messages of a row, by what the row is about
 TASK = "`tasks`, `max_priority`, `max_speed`, `max_distance`, `quota`"
@@ -48,27 +64,70 @@ BY_CONTENT = {
 Group = tuple[Row, list[str]]
 
 
-def table() -> str:
-    """Return the tables of kinds, commands and messages; equal rows share one line."""
+def short_table() -> str:
+    """Return the table of roles and forwarding, with the names of a few, or what they do."""
+    groups: dict[tuple[int, str], dict[str, list[str]]] = {}
+    for row in sorted([*_rows(), NAMELESS], key=_kind):
+        way = HANDLED if row.is_claimed else _way(row)
+        abouts = groups.setdefault((ROLES.index(row.role), way), {})
+        abouts.setdefault(row.about, []).append(row.name)
+    lines = ["| lowest role | forwarded | commands and messages |", "|---|---|---|"]
+    for (role, way), abouts in sorted(groups.items()):
+        parts = (_short(about, names) for about, names in abouts.items())
+        lines.append(f"| {ROLES[role]} | {way} | {'; '.join(parts)} |")
+    return "\n".join([*lines, ""])
+
+
+def full_table() -> str:
+    """Return the tables of kinds, commands and messages, and a legend; equal rows share a line."""
     kinds = [f"| {_name(kind)} | {kind.value} |" for kind in KINDS]
     commands = _lines(of_commands.COMMANDS.items(), (*of_commands.BY_WORDS, NAMELESS))
     messages = _lines(of_messages.MESSAGES.items(), (*of_messages.BY_WORDS, NAMELESS))
     parts = ["| kind | a message of this kind |\n|---|---|", *kinds]
-    parts += ["", "Commands:", "", HEAD, *commands, "", "Messages:", "", HEAD, *messages, ""]
+    parts += [
+        "",
+        LEGEND,
+        "Commands:",
+        "",
+        HEAD,
+        *commands,
+        "",
+        "Messages:",
+        "",
+        HEAD,
+        *messages,
+        "",
+    ]
     return "\n".join(parts)
 
 
 def rights() -> str:
-    """Return the table of who may do what, with the limits that hold for it."""
-    listed = (of_commands.COMMANDS.values(), of_messages.MESSAGES.values())
-    rows = [*chain(*listed), *of_commands.BY_WORDS, *of_messages.BY_WORDS]
+    """Return the table of who may do what, with the limits that hold for it.
+
+    What has no limits is grouped by kind, the rest by its limits.
+    """
     lines = ["| lowest role | what | limits |", "|---|---|---|"]
     for role in ROLES:
-        shown = [row for row in rows if row.role == role and row.kind not in QUIET]
-        abouts = {row.about: LIMITS.get(row.about, "") for row in sorted(shown, key=_kind)}
-        abouts |= BY_CONTENT.get(role, {})
-        lines += [f"| `{role}` | {about} | {limits} |" for about, limits in abouts.items()]
+        shown = [row for row in _rows() if row.role == role and row.kind not in QUIET]
+        groups: dict[tuple[str, str], dict[str, None]] = {}
+        for row in sorted(shown, key=_kind):
+            limits = LIMITS.get(row.about, "")
+            kind = Kind.MOTION if row.kind is Kind.STICKS else row.kind
+            groups.setdefault((limits, "" if limits else kind.name), {})[row.about] = None
+        for about, limits in BY_CONTENT.get(role, {}).items():
+            groups.setdefault((limits, ""), {})[about] = None
+        for (limits, _), abouts in groups.items():
+            lines.append(f"| `{role}` | {' · '.join(abouts)} | {limits} |")
     return "\n".join([*lines, ""])
+
+
+def _short(about: str, names: list[str]) -> str:
+    return about if len(names) > MOST_NAMES else ", ".join(names)
+
+
+def _rows() -> list[Row]:
+    listed = (of_commands.COMMANDS.values(), of_messages.MESSAGES.values())
+    return [*chain(*listed), *of_commands.BY_WORDS, *of_messages.BY_WORDS]
 
 
 def _kind(row: Row) -> int:
@@ -87,7 +146,7 @@ def _lines(numbered: Iterable[tuple[int, Row]], others: Iterable[Row]) -> Iterat
 
 def _order(group: Group) -> tuple[bool, int, int, str]:
     row, names = group
-    return (NAMELESS.name in names, KINDS.index(row.kind), ROLES.index(row.role), names[0])
+    return (NAMELESS.name in names, _kind(row), ROLES.index(row.role), names[0])
 
 
 def _name(kind: Kind) -> str:
@@ -104,10 +163,10 @@ def _line(row: Row, names: list[str]) -> str:
 def _way(row: Row) -> str:
     """Return whether and when a row is forwarded, in words."""
     if row.is_claimed and row.elsewhere is None:
-        return "handled; else as not listed"
+        return f"{HANDLED}; else as not listed"
     if row.is_claimed:
         on = row.passed_on
-        return f"handled; else {_name(on.kind)}, {on.role}, {_way(on)}"
+        return f"{HANDLED}; else {_name(on.kind)}, {on.role}, {_way(on)}"
     if row.needs_grant:
         return "only in control"
     if not row.passes_beside_task:
@@ -116,6 +175,6 @@ def _way(row: Row) -> str:
 
 
 if __name__ == "__main__":
-    wire = keep_current("dialects/README.md", "policy table", "policy_table.py", table())
-    guide = keep_current("mav_tasks/GUIDE.md", "table of rights", "policy_table.py", rights())
+    wire = keep_current(CONTRACT, "policy table", "policy_table.py", short_table())
+    guide = keep_current(GUIDE, "table of rights", "policy_table.py", rights())
     sys.exit(wire or guide)

@@ -1,6 +1,6 @@
 """Numbers in the task server's messages and commands that mean something of their own.
 
-The wire contract (``dialects/README.md``) explains them.
+The wire contract (``dialects/messages.md``, ``dialects/control.md``) explains them.
 """
 
 UNKNOWN_POSITION = 65535  # TASK_STATUS.queue_position

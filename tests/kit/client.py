@@ -38,7 +38,7 @@ ACK = IDS["COMMAND_ACK"]
 
 
 class TaskStatus(NamedTuple):
-    """TASK_STATUS, decoded manually as ``dialects/README.md`` permits."""
+    """TASK_STATUS, decoded manually as ``dialects/README.md`` shows."""
 
     time_boot_ms: int
     task_id: int

@@ -5,7 +5,6 @@ Rows of what the server handles itself are shown by ``test_roles.py``.
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
@@ -15,12 +14,12 @@ from mav_tasks.config.settings import ROLES, Clients, Limits, Roles, Settings
 from mav_tasks.mavlink import messages as m
 from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskState
+from policy_table import full_table
 from rover_sim.personas import Mode
 from tests.kit.client import GUIDED, FakeClient, command_long
 from tests.kit.world import COMMAND_ID, INT_COMMAND, MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "dialects/README.md"
 COMMANDS_OF_NOBODY, SET_MODE, NO_MODE = (99, 65000), 176, 104
 FILE_TRANSFER = 110  # what it asks for counts: zeros only read
 SEEN = 0.03  # s, in which what is sent is seen to, and answered by the rover
@@ -43,9 +42,8 @@ class Word(NamedTuple):
 
 
 def tables() -> tuple[str, str]:
-    """Return what the document has about commands, and about messages."""
-    text = DOCUMENT.read_text("utf-8").partition("<!-- policy table")[2].partition("<!-- end of")[0]
-    commands, _, messages = text.partition("\nCommands:")[2].partition("\nMessages:")
+    """Return what the table has about commands, and about messages."""
+    commands, _, messages = full_table().partition("\nCommands:")[2].partition("\nMessages:")
     return commands, messages
 
 

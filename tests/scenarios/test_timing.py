@@ -17,7 +17,7 @@ TICK = Settings().watch.setpoint_period
 
 
 class TaskTiming(NamedTuple):
-    """TASK_TIMING, decoded by hand as ``dialects/README.md`` draws it."""
+    """TASK_TIMING, decoded by hand as ``dialects/messages.md`` says."""
 
     time_boot_ms: int
     task_id: int

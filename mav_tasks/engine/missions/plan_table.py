@@ -2,8 +2,7 @@
 
 It is driven, or sent to the vehicle at its place, or skipped, as autopilots do that store what they
 cannot do; or the plan is refused, because it would be unsafe or mean nothing. A command without a
-row of its own is treated by its kind in the policy table. tools/plan_table.py prints all of it to
-dialects/README.md.
+row of its own is treated by its kind in the policy table. tools/plan_table.py prints it.
 """
 
 import re
@@ -194,16 +193,16 @@ def _place(command: Command) -> Place | None:
 #: numbers, or a kind of the policy table ("-bound" if it is) · what the server does with an item ·
 #: how, or why not and what to write · ArduPilot Rover 4.6.3 · PX4 1.17.0; "*": tried there
 TABLE = """
-16 | drives | drives there. Stops there if it has a hold time (param1) or a yaw (param4), or if the
-path bends by more than 45°; else passes within the acceptance radius (param2; if it is 0,
-`driving.acceptance_radius`, 0.5 m by default). At 0/0: stays here for the hold time |
-the same; 0/0 is here* | drives there; at 0/0 it sets off to that place on earth*
+16 | drives | drives there. Stops if it has a hold time (param1) or a yaw (param4), or the path
+bends by more than 45°; else passes within the acceptance radius (param2; 0:
+`driving.acceptance_radius`, 0.5 m). At 0/0: holds here | the same; 0/0 is here* | drives there; at
+0/0 it sets off to that place on earth*
 
 17 | drives | drives there and stays until another item is set | the same | the same
 
-18 | drives | drives to the circle of param3 metres round the place (negative: counter-clockwise;
-at least 0.9 m, and what its turning circle allows), and param1 turns on it. Always forwards; stops
-at the end. At 0/0: round the place before | the same, and drives on at the end* | refuses the plan*
+18 | drives | drives param1 turns forwards on the circle of param3 metres round the place (negative:
+counter-clockwise; at least 0.9 m, and its turning radius). At 0/0: round the place before |
+the same, and drives on at the end* | refuses the plan*
 
 19 | drives | as the command: drives there and stands for param1 seconds | the same | the same
 
@@ -222,19 +221,19 @@ the same; if all are 0 it stands until midnight* | ignores a time of day*
 112 | drives | delays the following items, up to the next place, by param1 seconds | the same |
 stores it
 
-114 | drives | the same, until that place is param1 metres away | the same | stores it
+114 | drives | delays them until that place is param1 metres away | the same | stores it
 
 115 | drives | as the command: turns to a heading | skips it* | refuses the plan*
 
 177 | drives | continues with item param1, param2 times in the whole plan (-1: for ever). A loop
 without motion is refused | the same* | the same
 
-178 | drives | from here on drives at param2 m/s, at most the server's limit; airspeed counts as
-ground speed. 0, -1: no change (PX4: back to the default). -2: back to the default |
+178 | drives | from here on drives at param2 m/s, at most the server's limit. 0, -1: no change (PX4:
+default). -2: default |
 no change for 0, -1, -2* | back to its default for 0, -1, -2*
 
-194 | drives | param1 = 1: drives to the following places backwards, else forwards again; not a
-return and a circle. Refused for a rover that cannot reverse | the same* | refuses the plan*
+194 | drives | param1 = 1: drives to the following places backwards, else forwards; not a return or
+a circle. Refused for a rover that cannot reverse | the same* | refuses the plan*
 
 213 | drives | as the command: drives on a heading for 3 s | until the heading is reached |
 refuses the plan
@@ -251,13 +250,11 @@ refuses the plan* | the same*
 
 54000 54001 54002 | drives | as the command; param5 and param6 (after, delay) must be 0 | – | –
 
-54015 | drives | the next item is sent, once, when its turn comes, to component param1 (0: the
-autopilot); the plan waits until it is accepted, and fails if it is refused or has no answer within
-param2 seconds (0: 10) | – | –
+54015 | drives | sends the next item once, to component param1 (0: the autopilot), and waits until
+it is accepted, for param2 seconds (0: 10; up to 600) | – | –
 
-54014 | drives | options of the whole plan: param1 priority, param2 start delay s, param3 deadline s
-(both from the end of the upload), param4 run after, param5 (`x`) nonce, param6 (`y`) more bits of
-your nonce: a plan that repeats the nonce with another number there is another plan | – | –
+54014 | drives | options of the whole plan. 1: priority · 2: start delay, s · 3: deadline, s (from
+the end of the upload) · 4: run after · 5 (`x`): nonce · 6 (`y`): more bits of it | – | –
 
 82 | skips | a curve; write NAV_WAYPOINT (16) if it shall be driven to | skips it* |
 refuses the plan*

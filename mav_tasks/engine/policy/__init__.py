@@ -1,7 +1,7 @@
 """The policy table: which role may send which message or command, and what goes on to a rover.
 
 All such decisions come from it. Pure. ``row_of_command`` and ``row_of_message`` know the number
-only; ``row_of`` looks at the content, too. tools/policy_table.py prints it to dialects/README.md.
+only; ``row_of`` looks at the content, too. tools/policy_table.py prints it.
 """
 
 from dataclasses import replace

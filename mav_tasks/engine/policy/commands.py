@@ -74,7 +74,7 @@ UNKNOWN = Row("", Kind.MOTION, OPERATOR, "not listed")
 #: numbers reserved for tasks
 TASK_COMMANDS = range(54000, 54050)
 
-ACTS = Row("", Kind.ACTION, OPERATOR, "servos, relays, cameras, gimbals, home, commands of plans")
+ACTS = Row("", Kind.ACTION, OPERATOR, "servos, relays, cameras, gimbals, home")
 ASKS = Row("", Kind.QUESTION, OBSERVER, "requests for information")
 GOES = Row("", Kind.GO, OPERATOR, "arms, changes the mode, starts the vehicle's own mission")
 MOVES = Row(
@@ -85,7 +85,7 @@ SERVICES = Row(
     "",
     Kind.MOTION,
     SAFETY,
-    "motor tests, calibration, firmware, restart; may move a disarmed vehicle, too",
+    "motor tests, calibration, firmware, restart",
     is_bound=True,
 )
 BOUNDS = Row(
@@ -106,9 +106,7 @@ def named(row: Row, names: str) -> dict[int, Row]:
 
 
 #: rows of commands by content; the row of their number is that of the most dangerous content
-DISARM = Row(
-    "COMPONENT_ARM_DISARM with param1 = 0", Kind.HALT, OBSERVER, "disarms; forwarded at once"
-)
+DISARM = Row("COMPONENT_ARM_DISARM with param1 = 0", Kind.HALT, OBSERVER, "disarms")
 PAUSE = handled("DO_PAUSE_CONTINUE with param1 = 0", Kind.HALT, OBSERVER, "pauses", GOES)
 PAUSE_HERE = replace(PAUSE, name="DO_REPOSITION without a place", elsewhere=MOVES)
 HOLD = handled("DO_SET_MODE, SET_MODE: HOLD", Kind.HALT, OBSERVER, "sets HOLD")
@@ -142,7 +140,7 @@ CLAIMED = {
     **named(replace(SUBMITS, elsewhere=GOES), "20 NAV_RETURN_TO_LAUNCH"),
     **named(replace(SUBMITS, elsewhere=ACTS), "93 NAV_DELAY"),
     21: handled("NAV_LAND", Kind.WISH, OBSERVER, "disarms once no task is left", GOES),
-    22: handled("NAV_TAKEOFF", Kind.WISH, OBSERVER, "accepted without effect", MOVES),
+    22: handled("NAV_TAKEOFF", Kind.WISH, OBSERVER, "take-off: accepted without effect", MOVES),
     178: handled("DO_CHANGE_SPEED", Kind.WISH, OPERATOR, "sets the speed of tasks", MOVES),
     193: handled("DO_PAUSE_CONTINUE", Kind.GO, OPERATOR, "resumes", GOES),
     176: replace(GOES, name="DO_SET_MODE", about="any other mode"),
@@ -181,9 +179,7 @@ PASSED_ON = {
         42002 SOLO_BTN_FLY_HOLD, 42003 SOLO_BTN_PAUSE_CLICK""",
     ),
     **named(
-        replace(
-            GOES, role=SAFETY, is_bound=True, about="can do any of these, and disable the fence"
-        ),
+        replace(GOES, role=SAFETY, is_bound=True, about="auxiliary functions, safety switch"),
         "218 DO_AUX_FUNCTION, 5300 DO_SET_SAFETY_SWITCH_STATE",
     ),
     **named(

@@ -142,7 +142,7 @@ MESSAGES: Mapping[int, Row] = {
         10007 UAVIONIX_ADSB_OUT_CONTROL""",
     ),
     **named(
-        replace(ACTS, about="sent by vehicles and components; another vehicle might act on it"),
+        replace(ACTS, about="telemetry, which another vehicle might act on"),
         """1 SYS_STATUS, 6 CHANGE_OPERATOR_CONTROL_ACK, 22 PARAM_VALUE, 24 GPS_RAW_INT,
         25 GPS_STATUS, 26 SCALED_IMU, 27 RAW_IMU, 28 RAW_PRESSURE, 29 SCALED_PRESSURE,
         30 ATTITUDE, 31 ATTITUDE_QUATERNION, 32 LOCAL_POSITION_NED, 33 GLOBAL_POSITION_INT,

@@ -1,5 +1,5 @@
 """Recordings as MCAP files: ``mav-tasks export``.
 
-dialects/README.md, "Recordings as MCAP", has the convention. Only ``writing`` imports the mcap
-package, which is an extra.
+dialects/recordings.md has the convention. Only ``writing`` imports the mcap package, which is an
+extra.
 """

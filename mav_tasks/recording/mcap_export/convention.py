@@ -1,7 +1,7 @@
 """The names in an MCAP file.
 
-dialects/README.md, "Recordings as MCAP", describes them. A change that a reader of older files
-would notice needs a new VERSION.
+dialects/recordings.md describes them. A change that a reader of older files would notice needs a
+new VERSION.
 """
 
 from mav_tasks.mavlink.address import Address

@@ -60,7 +60,7 @@ wanted = KEYS["driving.creep_deg"].put(ServerSettings(), radians(6))
 assert taken(ServerSettings(), wanted) == wanted
 assert list(PARAMETERS)[-1] == "TSK_CREEP"
 assert changed(Settings(), "TSK_CREEP", 7.0).driving == Driving(creep=radians(7))
-row = "TSK_CREEP | `driving.creep_deg` | 1..9 | deg/s | rate of a slow turn; at most TSK_TURN"
+row = "TSK_CREEP | 1..9 deg/s | rate of a slow turn; at most TSK_TURN"
 assert f"| {{row}} |\\n" in table()
 record = asdict(Settings(driving=Driving(creep=radians(8))))
 assert settings_of(record).driving.creep == radians(8)

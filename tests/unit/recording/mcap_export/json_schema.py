@@ -1,6 +1,6 @@
 """Judges the JSON of exported channels by its schema, with jsonschema.
 
-A number may be null, whatever its schema says (dialects/README.md).
+A number may be null, whatever its schema says (dialects/recordings.md).
 """
 
 from collections.abc import Mapping
