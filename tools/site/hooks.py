@@ -9,12 +9,10 @@ another host.
 
 import re
 import tomllib
-from collections.abc import Iterator
-from functools import cache, partial
 from pathlib import Path
 from posixpath import dirname, join, normpath
-from typing import Any
 
+from jinja2 import Environment, StrictUndefined
 from mermaidx import render
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import get_plugin_logger
@@ -24,50 +22,54 @@ from mkdocs.structure.pages import Page
 import reference
 
 ROOT = Path(__file__).resolve().parents[2]
-PICTURES = "mav_tasks/guide/images/*"
+README = (ROOT / "README.md").read_text()
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+#: no ``repo_url`` of MkDocs: with one, pages would ask GitHub
+SOURCE = PROJECT.get("urls", {}).get("Source", "")
 RELATIVE = re.compile(r"(?<!!)\[([^\]]+)\]\((?!\w+:|#)([^)\s]+)\)")
 DIAGRAM = re.compile(r"^```mermaid\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
 FOREIGN = re.compile(r"<(?:script|link|img|iframe|source)\b[^>]*?\b(?:src|href)=\"?(?:https?:)?//")
 
 log = get_plugin_logger("site")
+templates = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
 
 
 def on_config(config: MkDocsConfig) -> None:
     """Put the files that match into ``nav``."""
-    config.nav = list(_expanded(config.nav or []))
+    for section in config.nav or []:
+        for title, patterns in section.items():
+            section[title] = [path for pattern in patterns for path in _matching(pattern)]
 
 
 def on_files(files: Files, config: MkDocsConfig) -> None:
-    """Add the pages of ``nav`` and the pictures of the guide."""
-    pictures = (path.relative_to(ROOT).as_posix() for path in ROOT.glob(PICTURES))
-    add = partial(File.generated, config, inclusion=InclusionLevel.INCLUDED)
-    for path in [*_paths(config.nav or []), *pictures]:
-        folder, _, name = path.partition("/")
-        if folder == "reference":
-            files.append(add(path, content=reference.PAGES[name]()))
-            continue
-        file = add(path, abs_src_path=str(ROOT / path))
-        file.dest_uri = file.dest_uri.removeprefix(".github/")  # servers may hide such a folder
-        files.append(file)
+    """Add the pages of ``nav``, and the pictures of the guide."""
+    pages = [path for section in config.nav or [] for paths in section.values() for path in paths]
+    for path in (*pages, *_matching("mav_tasks/guide/images/*")):
+        if not path.startswith("reference/"):
+            place, inclusion = str(ROOT / path), InclusionLevel.INCLUDED
+            file = File.generated(config, path, abs_src_path=place, inclusion=inclusion)
+            file.dest_uri = file.dest_uri.removeprefix(".github/")  # servers may hide such a folder
+            files.append(file)
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Draw the diagrams of a page, and look at its links to the source."""
+    """Fill in a page of the reference; draw diagrams, and look at links to the source."""
+    uri = page.file.src_uri
+    if uri.startswith("reference/"):
+        return templates.from_string(markdown).render(reference.shown())
 
     def linked(found: re.Match[str]) -> str:
         text, target = found.groups()
-        path = normpath(join(dirname(page.file.src_uri), target.partition("#")[0]))
-        is_source = (ROOT / path).exists() and not path.endswith(".md")
-        if not is_source or files.get_file_from_path(path):
+        path = normpath(join(dirname(uri), target.partition("#")[0]))
+        if path.endswith(".md") or files.get_file_from_path(path) or not (ROOT / path).exists():
             return found[0]
-        return f"[{text}]({_source()}/blob/main/{path})" if _source() else text
+        return f"[{text}]({SOURCE}/blob/main/{path})" if SOURCE else text
 
     def drawn(found: re.Match[str]) -> str:
-        uri = f"{page.file.src_uri.removesuffix('.md')}-{found.start()}.svg"
-        files.append(File.generated(config, uri, content=render(found[1]).svg()))
-        about = HEADING.findall(markdown, 0, found.start())[-1]
-        return f"[![Diagram: {about}]({Path(uri).name})]({Path(uri).name})"
+        name = f"{page.file.name}-{found.start()}.svg"
+        svg = render(found[1]).svg()
+        files.append(File.generated(config, join(dirname(uri), name), content=svg))
+        return f"[![Diagram of what is said here]({name})]({name})"
 
     return RELATIVE.sub(linked, DIAGRAM.sub(drawn, markdown))
 
@@ -78,39 +80,11 @@ def on_post_page(output: str, page: Page, **_others: object) -> None:
         log.warning("%s fetches from another host: %s", page.file.src_uri, found[0])
 
 
-def _expanded(entries: list[Any]) -> Iterator[Any]:
-    for entry in entries:
-        if isinstance(entry, dict):
-            yield {
-                title: list(_expanded(below)) if isinstance(below, list) else below
-                for title, below in entry.items()
-            }
-        elif "*" in entry:
-            found = sorted(ROOT.glob(entry), key=_place)
-            yield from (path.relative_to(ROOT).as_posix() for path in found)
-        else:
-            yield entry
+def _matching(pattern: str) -> list[str]:
+    """Return the files that match, first those that the README links to; else what is no pattern.
 
-
-def _place(path: Path) -> tuple[bool, int, str]:
-    """Return what orders the files of a folder."""
-    beside = path.parent / "README.md"
-    text = (beside if beside.exists() else ROOT / "README.md").read_text(encoding="utf-8")
-    found = re.search(rf"[/(]{re.escape(path.name)}", text)
-    return path != beside, found.start() if found else len(text), path.name
-
-
-def _paths(entries: list[Any]) -> Iterator[str]:
-    for entry in entries:
-        if isinstance(entry, dict):
-            for below in entry.values():
-                yield from _paths(below if isinstance(below, list) else [below])
-        else:
-            yield entry
-
-
-@cache
-def _source() -> str:
-    """Return the address of the source. It is no ``repo_url``: then pages would ask GitHub."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    return str(project.get("urls", {}).get("Source", "")).rstrip("/")
+    A page of the reference is no file of the repository.
+    """
+    found = [path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern)]
+    found.sort(key=lambda name: (name not in README, README.find(name), name))
+    return found if found or "*" in pattern else [pattern]
