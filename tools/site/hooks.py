@@ -1,18 +1,17 @@
 """What MkDocs lacks for the site: pages from the whole repository, diagrams without a script.
 
-``on_config`` finds the files for the patterns of ``nav``, and ``on_files`` adds them: each page has
-the path that it has in the repository, so that links between pages need no change. MkDocs checks
-these links. A link to a file that is no page leads below ``Source`` of ``[project.urls]``; while
-the owner has not said where the source is, its text stays alone. No page may make a browser ask
-another host.
+Each page has the path that it has in the repository, so that links between pages need no change;
+MkDocs checks them. A link to a file that is no page leads below ``Source`` of ``[project.urls]``;
+while the owner has not said where the source is, its text stays alone. No page may make a browser
+ask another host.
 """
 
 import re
 import tomllib
 from pathlib import Path
-from posixpath import dirname, join, normpath
+from posixpath import basename, dirname, join, normpath
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from mermaidx import render
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import get_plugin_logger
@@ -22,8 +21,8 @@ from mkdocs.structure.pages import Page
 import reference
 
 ROOT = Path(__file__).resolve().parents[2]
-README = (ROOT / "README.md").read_text()
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 #: no ``repo_url`` of MkDocs: with one, pages would ask GitHub
 SOURCE = PROJECT.get("urls", {}).get("Source", "")
 RELATIVE = re.compile(r"(?<!!)\[([^\]]+)\]\((?!\w+:|#)([^)\s]+)\)")
@@ -31,32 +30,36 @@ DIAGRAM = re.compile(r"^```mermaid\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FOREIGN = re.compile(r"<(?:script|link|img|iframe|source)\b[^>]*?\b(?:src|href)=\"?(?:https?:)?//")
 
 log = get_plugin_logger("site")
-templates = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-
-
-def on_config(config: MkDocsConfig) -> None:
-    """Put the files that match into ``nav``."""
-    for section in config.nav or []:
-        for title, patterns in section.items():
-            section[title] = [path for pattern in patterns for path in _matching(pattern)]
+templates = Environment(
+    loader=FileSystemLoader(ROOT / "tools/site/templates"),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> None:
-    """Add the pages of ``nav``, and the pictures of the guide."""
-    pages = [path for section in config.nav or [] for paths in section.values() for path in paths]
-    for path in (*pages, *_matching("mav_tasks/guide/images/*")):
-        if not path.startswith("reference/"):
+    """Put the files that match into ``nav``; add them, and the pictures of the guide."""
+    shown = reference.shown()
+    paths = _matching("mav_tasks/guide/images/*")
+    for section in config.nav or []:
+        for title, patterns in section.items():
+            section[title] = [path for pattern in patterns for path in _matching(pattern)]
+            paths += section[title]
+    for path in paths:
+        if path.startswith("reference/"):
+            template = templates.get_template(f"{basename(path)}.jinja")
+            file = File.generated(config, path, content=template.render(shown))
+        else:
             place, inclusion = str(ROOT / path), InclusionLevel.INCLUDED
             file = File.generated(config, path, abs_src_path=place, inclusion=inclusion)
             file.dest_uri = file.dest_uri.removeprefix(".github/")  # servers may hide such a folder
-            files.append(file)
+        files.append(file)
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Fill in a page of the reference; draw diagrams, and look at links to the source."""
+    """Draw the diagrams of a page, and look at its links to the source."""
     uri = page.file.src_uri
-    if uri.startswith("reference/"):
-        return templates.from_string(markdown).render(reference.shown())
 
     def linked(found: re.Match[str]) -> str:
         text, target = found.groups()

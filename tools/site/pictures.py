@@ -15,7 +15,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
+sys.path.insert(0, str(ROOT))
 
 from tests.kit.web import Web, served  # noqa: E402
 

@@ -1,9 +1,8 @@
-"""What the pages in pages/reference show: they are Jinja templates, filled in from the code."""
+"""What the reference shows: the templates in templates/ are filled in from the code with it."""
 
 import subprocess
 import sys
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,6 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))  # the folder of the t
 import policy_table
 
 
-@cache
 def shown() -> dict[str, Any]:
     """Return what the templates name."""
     return {
@@ -52,22 +50,19 @@ def _commands(command: Any, name: str, parent: Any) -> Iterator[dict[str, Any]]:
         command = command.load()
     context = command.context_class(command, info_name=name, parent=parent)
     usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
+    if isinstance(command, Program):  # its own help names its options
+        arguments = [sys.executable, "-m", "mav_tasks.cli", name, "--help"]
+        usage = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout
     records = (each.get_help_record(context) for each in command.get_params(context))
     yield {
         "name": context.command_path,
-        "usage": _help_of(name) if isinstance(command, Program) else usage,
+        "usage": usage,
         "help": command.help,
         "options": [record for record in records if record and "--help" not in record[0]],
         "epilog": command.epilog,
     }
     for each in getattr(command, "commands", {}).values():
         yield from _commands(each, each.name, context)
-
-
-def _help_of(program: str) -> str:
-    """Return the help of a program of its own, which names its options itself."""
-    command = [sys.executable, "-m", "mav_tasks.cli", program, "--help"]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 def _services() -> Services:
