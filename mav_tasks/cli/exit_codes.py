@@ -1,4 +1,4 @@
-"""Exit statuses and error messages of all commands. GUIDE.md has the table.
+"""Exit statuses and error messages of all commands. guide/tasks.md has the table.
 
 Only this module turns an error into a message for the operator: one line on standard error.
 """

@@ -21,7 +21,7 @@ RECHECK = 0.03  # s; how soon to look whether the session of a process that has 
 
 @dataclass(frozen=True, slots=True)
 class Join:
-    """Give this gateway a new epoch, unless another process has its name.
+    """Begin a new epoch of this gateway, unless another process has its name.
 
     A process that lost its session may still move vehicles under this name: a row of an unknown
     epoch ends as that of any other gateway does, by an eviction.
@@ -50,7 +50,7 @@ class Evict:
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """Give this gateway those of these vehicles that no gateway holds."""
+    """Take for this gateway those of these vehicles that no gateway holds."""
 
     by: Renew
     vehicles: frozenset[int]

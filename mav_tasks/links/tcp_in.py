@@ -200,7 +200,7 @@ class TcpInLink(TcpLink):
         return False
 
     def _place(self, waiting: Waiting) -> bool:
-        """Give a place to one that waits, also beyond the limit: ``_make_room`` comes next."""
+        """Accept one that waits, also beyond the limit: ``_make_room`` comes next."""
         self._waiting.unregister(waiting.socket)
         try:
             # A peer whose old connection from the same address has not ended yet, or not for the

@@ -2,6 +2,7 @@
 
 The log has all packets received from vehicles and clients, and all packets sent to vehicles. Of the
 packets sent to clients it has only the server's own: forwarded telemetry was logged when received.
+SETUP_SIGNING is left out: it has a key, and people send logs to each other.
 """
 
 import struct
@@ -61,7 +62,7 @@ class TlogContent:
         when = self._when(now)
         from_vehicles = item.link in self._vehicle_links
         for _, packet, _ in self._intake.packets(item, self._counts, now=now):
-            if crc_fits(packet):
+            if packet.message_id != m.SetupSigning.id and crc_fits(packet):
                 if from_vehicles:
                     self._heard.add(_words(packet.raw))
                 yield when + packet.raw

@@ -39,7 +39,7 @@ class Pump:
         self.is_evicted = False
 
     def handle(self, item: Input, *, now: float) -> None:
-        """Give the engine one input; ``turn`` sends and stores the results."""
+        """Pass one input to the engine; ``turn`` sends and stores the results."""
         self._observers.on_input(item, now=now)
         self.engine.handle(item, now=now)
 

@@ -153,7 +153,7 @@ class Permit(Generic[T]):
         return f"Permit({self.given}, until={self._until:.2f})"
 
     def give(self, holder: T, *, until: float = inf) -> None:
-        """Give the permit to a holder; this replaces the previous holder."""
+        """Let a holder have the permit; this replaces the previous holder."""
         self.given, self._term, self._until = holder, self._halts.term, until
 
     def end(self) -> None:

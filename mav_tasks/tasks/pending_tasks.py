@@ -246,7 +246,7 @@ class PendingTasks:
         self._settle(task, now=now)
 
     def assign(self, task: Task, vehicle: int, *, choice: str, now: float) -> None:
-        """Give a waiting task to another vehicle, in whose queue it keeps its rank."""
+        """Move a waiting task to another vehicle, in whose queue it keeps its rank."""
         is_ready = task.id in self._queues[task.vehicle]
         self._queues[task.vehicle].discard(task.id)
         self.woken |= {task.vehicle, vehicle}

@@ -225,7 +225,7 @@ class TaskRegistry:
         return task
 
     def assign(self, task_id: TaskId, vehicle: int, *, choice: str, now: float) -> Task:
-        """Give a waiting task to another vehicle; ``choice`` says why."""
+        """Move a waiting task to another vehicle; ``choice`` says why."""
         old = self._tasks[task_id]
         assert old.state in WAITING, f"{old} has begun"
         self._forget_live(old)

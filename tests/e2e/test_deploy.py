@@ -18,8 +18,8 @@ from tests.kit.processes import free_udp_ports, process
 
 ROOT = Path(__file__).resolve().parents[2]
 DEPLOY = ROOT / "tools" / "deploy"
-GUIDE = (ROOT / "mav_tasks" / "GUIDE.md").read_text(encoding="utf-8")
-SERVICE = GUIDE[GUIDE.index("## Run it as a service\n") :]
+GUIDE = (ROOT / "mav_tasks/guide/running.md").read_text(encoding="utf-8")
+SERVICE = GUIDE[GUIDE.index("## As a service\n") :]
 INSTALL, DOCKER = re.findall(r"^```sh\n(.*?)^```", SERVICE, flags=re.MULTILINE | re.DOTALL)
 UNIT = (DEPLOY / "mav-tasks.service").read_text(encoding="utf-8")
 PROGRAM = str(Path(sys.executable).with_name("mav-tasks"))

@@ -95,7 +95,7 @@ def without_extras(python: str, folder: Path) -> None:
     readme = run(python, "-c", told, folder=folder).stdout
     assert "## Ten minutes" in readme
     assert "](" not in readme, "links of a repository that a reader of the wheel has not"
-    for document in ("README.md", "GUIDE.md", "CHANGELOG.md"):
+    for document in ("README.md", "guide/clients.md", "CHANGELOG.md"):
         assert (Path(path).parents[1] / document).is_file()
     assert (Path(path).parents[1] / "metrics" / "grafana.json").is_file()
 

@@ -85,7 +85,7 @@ def twin_of(
 
 
 def preset(vehicle: Vehicle, persona: Persona) -> None:
-    """Give a rover the parameters of the scenarios."""
+    """Set the parameters of the scenarios on a rover."""
     if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
         # by default a PX4 rover drives home when setpoints stop, and the server does not
         # drive it; tests of that restore the default

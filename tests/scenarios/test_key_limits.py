@@ -45,7 +45,7 @@ def agents(limits: Limits | None = None, *, role: str = "submitter", secret: byt
 
 
 def put(world: World, *keys: Key) -> None:
-    """Give a server its keys, as the watch of the key ring does."""
+    """Hand a server its keys, as the watch of the key ring does."""
     world.server.pump.handle(KeysChanged(keys), now=world.now)
     world.server.pump.turn(now=world.now)
 

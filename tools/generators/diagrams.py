@@ -17,7 +17,7 @@ NAMES = {
 NOTES = {
     Queue.RUNS: "tasks run one after another",
     Queue.PAUSED: "no task starts before a resume",
-    Queue.TAKEN: "somebody else controls the rover; set HOLD, then resume",
+    Queue.TAKEN: "somebody else controls the rover, set HOLD and resume",
     Queue.STOPPED: "STOP is in force until a resume",
 }
 WORDS = {

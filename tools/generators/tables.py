@@ -1,4 +1,4 @@
-"""The tables of the documents: who may send what, what becomes of plans, parameters, rights.
+"""The tables of the documents: who may send what, what becomes of plans, parameters.
 
 The short ones stand in the wire contract; the full ones have every command and message.
 """
@@ -23,7 +23,6 @@ from mav_tasks.engine.policy import messages as of_messages
 from mav_tasks.engine.policy.commands import ACTS, COMMANDS, UNKNOWN
 
 KINDS = list(Kind)
-QUIET = (Kind.QUESTION, Kind.TELL)  # they change nothing
 HEAD = "| kind | lowest role | purpose | forwarded | commands or messages |\n|---|---|---|---|---|"
 NAMELESS = replace(UNKNOWN, name="all others")
 #: kinds that have a plainer name in the document
@@ -41,29 +40,6 @@ LEGEND = """\
 - *bound*: can change more than motion.
 - *not counted*: does not count towards the rate limit of requests.
 """
-
-#: the limits that hold for the commands and messages of a row, by what the row is about
-TASK = "`tasks`, `max_priority`, `max_speed`, `max_distance`, `quota`"
-LIMITS = {
-    "creates a task": TASK,
-    "uploads a mission": TASK,
-    "starts one's own plan": TASK,
-    "starts a return or the mission, which the server drives": TASK,
-    "changes one's own task": "`max_priority`",
-    "sets the speed of tasks": "`max_speed`",
-}
-#: what depends on the content of a task and on its owner (``engine/clients/rights.py``)
-BY_CONTENT = {
-    "operator": {
-        "does all that with everybody's tasks": "as for one's own",
-        "makes a task pre-emptive, or runs it immediately": TASK,
-        "sends a plan that has commands to the rover": TASK,
-        "starts a plan in a paused queue, or of a rover in a manual mode": TASK,
-    },
-    "safety": {
-        "sends a plan that switches the rover's fence, or auxiliary functions (207, 218)": TASK
-    },
-}
 
 Group = tuple[Row, list[str]]
 
@@ -110,26 +86,6 @@ def full_policy() -> str:
         "",
     ]
     return "\n".join(parts)
-
-
-def rights() -> str:
-    """Return the table of who may do what, with the limits that hold for it.
-
-    What has no limits is grouped by kind, the rest by its limits.
-    """
-    lines = ["| lowest role | what | limits |", "|---|---|---|"]
-    for role in ROLES:
-        shown = [row for row in _policy_rows() if row.role == role and row.kind not in QUIET]
-        groups: dict[tuple[str, str], dict[str, None]] = {}
-        for row in sorted(shown, key=_kind):
-            limits = LIMITS.get(row.about, "")
-            kind = Kind.MOTION if row.kind is Kind.STICKS else row.kind
-            groups.setdefault((limits, "" if limits else kind.name), {})[row.about] = None
-        for about, limits in BY_CONTENT.get(role, {}).items():
-            groups.setdefault((limits, ""), {})[about] = None
-        for (limits, _), abouts in groups.items():
-            lines.append(f"| `{role}` | {' · '.join(abouts)} | {limits} |")
-    return "\n".join([*lines, ""])
 
 
 def _short(about: str, names: list[str]) -> str:

@@ -237,7 +237,7 @@ class Assignments:
         return self._registry.is_durable(task.id) and not is_wanted_there
 
     def _assign_again(self, task: Task, why: str, *, now: float) -> None:
-        """Give a task to another vehicle; it stays if no other one can drive it."""
+        """Move a task to another vehicle; it stays if no other one can drive it."""
         candidates = [
             self._candidate(each, task.goal, _driven_alike, now=now)
             for each in self._vehicles.all

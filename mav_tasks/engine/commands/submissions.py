@@ -357,7 +357,7 @@ class Submissions:
         self.gate.hold(accept, give_up, now=now, is_halt=not ends_tasks)
 
     def answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
-        """Give a repeated submission the answer of the first, once that has one."""
+        """Answer a repeated submission as the first, once that has an answer."""
         if known.task_id in self._undecided:
             askers = self._undecided[known.task_id]
             if asked.answers_to not in {each.answers_to for each in askers}:

@@ -100,7 +100,7 @@ class Retry:
         self.next_at = now + self.interval
 
     def renew(self, now: float) -> None:
-        """Give it as long as at first, from now on."""
+        """Start again, with as much time as at first."""
         self.give_up_at += now - self.sent_at
 
     def next_deadline(self) -> float:

@@ -213,7 +213,7 @@ class Keeper:
         return min(deadlines)
 
     def _talk(self, now: float) -> None:
-        """Give the asker its next job, if it has none."""
+        """Hand the asker its next job, if it has none."""
         if self._is_busy:
             return
         if not self._is_connected:

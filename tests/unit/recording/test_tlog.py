@@ -113,7 +113,8 @@ def test_each_packet_stands_there_once_at_its_time(tmp_path: Path) -> None:
     shown = to_client(packet(heartbeat(mode=15), ROVER, 31))  # another mode than its own
     tlog.on_output([*passed_on, shown], [], now=1.25)
     asked = packet(m.CommandLong(1, 191, 54000, 0, 1.0, 0, 0, 0, 0, 0, 5), GCS, 3)
-    tlog.on_input(Packets("clients", [("gcs", asked)]), now=1.5)
+    secret = packet(m.SetupSigning(1, 1, [107] * 32, 0), GCS, 4)  # which no log has
+    tlog.on_input(Packets("clients", [("gcs", asked), ("gcs", secret)]), now=1.5)
     own = [
         to_client(packet(ack(54000), SERVER, 1)),
         to_client(packet(ack(400), ROVER, 32)),  # in the autopilot's name
