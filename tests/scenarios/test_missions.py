@@ -148,10 +148,6 @@ def test_after_a_stop_or_while_it_may_not_be_armed_a_start_is_refused(
     assert start(world) == (TEMPORARILY_REJECTED, reason)
 
 
-def test_a_start_without_a_plan_is_refused(world: World) -> None:
-    assert start(world) == (DENIED, R.NOT_FOUND)
-
-
 @for_each("how", ["command", "message"])
 def test_another_item_is_gone_on_with(world: World, how: str) -> None:
     uploaded(world)

@@ -12,7 +12,7 @@ class Profile:
     name: str
     ack_timeout: float  # [2.2]; checked each half second
     restarts_timer: bool  # a repeated command gets the whole time again; [11.1]: 4.x does not
-    in_progress: str  # [2.4]: "restarts" the time, is "kept" pending, or is "final"
+    in_progress: str  # [2.4]: "restarts" the time, or is "kept" pending
     asks_protocol_version: bool  # [1.3]: of PX4 and generic; no answer: MAVLink 1
     asks_modes: bool  # [1.3] AVAILABLE_MODES
     asks_gimbals: bool  # [1.3] of each component; [11.1]: 4.x does not
