@@ -83,3 +83,4 @@ def test_both_are_installed_where_it_looks(tmp_path: Path, programs: list[str]) 
         actions = read(path.read_text(encoding="utf-8"), file_type)
         assert [action["compId"] for action in actions] == [191] * len(ACTIONS)
     assert said.count("wrote") == len(programs) * len(FILE_TYPES)
+    assert "Enable Custom Actions" in said
