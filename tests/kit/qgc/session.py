@@ -106,7 +106,7 @@ class Session:
             return
         self._gimbals_asked[component] = asked + 1
 
-        def done(message: Message, is_answered: bool) -> None:
+        def done(message: Message) -> None:
             if message is not None:
                 self._gimbals_asked[component] = GIMBAL_TRIES
 
