@@ -49,4 +49,7 @@ def qgc_actions(
     folder = user_documents_path() if documents is None else Path(documents)
     for path in files.install(folder, actions, component=component):
         sys.stdout.write(f"wrote {path}\n")
-    sys.stdout.write("Now select the file in QGroundControl: Application Settings, Fly View\n")
+    sys.stdout.write(
+        "Now select the file in QGroundControl: Application Settings, Fly View"
+        " (4.3 and 4.4: General, Enable Custom Actions)\n"
+    )

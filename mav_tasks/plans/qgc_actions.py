@@ -8,6 +8,7 @@ parameters.
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 from mav_tasks.basics.errors import UsageError
@@ -17,6 +18,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavComponent
 #: file types, each also the name of the folder in which QGroundControl looks for such a file
 MAVLINK_ACTIONS, CUSTOM_ACTIONS = "MavlinkActions", "CustomActions"
 FILE_TYPES = (MAVLINK_ACTIONS, CUSTOM_ACTIONS)
+PROGRAM, DAILY = "QGroundControl", "QGroundControl Daily"  # folders; that of a daily build
 FILE_NAME = "mav-tasks.json"
 PRIORITY = 5.0  # an omitted parameter is 0, which is the lowest priority
 MAX_COMMAND = 0xFFFF
@@ -108,8 +110,9 @@ def install(documents: Path, actions: Sequence[Action], *, component: int) -> li
     Raise UsageError if one cannot be written.
     """
     written = []
-    for file_type in FILE_TYPES:
-        path = documents / "QGroundControl" / file_type / FILE_NAME
+    programs = (PROGRAM, DAILY) if (documents / DAILY).is_dir() else (PROGRAM,)
+    for program, file_type in product(programs, FILE_TYPES):
+        path = documents / program / file_type / FILE_NAME
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, file_of(actions, file_type=file_type, component=component))

@@ -105,6 +105,10 @@ class Plan:
         count = self.item_count
         return f"plan of {count} item{'s' if count != 1 else ''}"
 
+    def present_step(self, step: int) -> int:
+        """Return the step of a progress; before the plan begins, the one at which it starts."""
+        return self.first if step < 0 else step
+
     def item_number(self, step: int) -> int:
         """Return the number of a step's item in its file, from 1; 0 is home."""
         return number_of(step, has_home=self.has_home)

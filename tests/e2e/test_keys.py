@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from mav_tasks import Key, Move, NoAnswer, SyncClient
+from tests.kit.cases import for_each
 from tests.kit.commands import Done, called, mav_tasks
 from tests.kit.processes import Stand, stand, wait_until
 from tests.kit.terminal import Terminal, terminal
@@ -86,6 +87,23 @@ def test_a_key_is_made_shown_once_listed_and_revoked(ring: Path) -> None:
     assert called("keys", "revoke", "anna", "--keys", str(ring)).status == 2
     again = called("keys", "list", "--json", "--keys", str(ring)).objects[0]
     assert (again["usable"], again["fingerprint"]) == (False, key.fingerprint)
+
+
+@for_each(
+    "how, secret",
+    [
+        ("sha256", "c4bbcb1fbec99d65bf59d85c8cb62ee2db963f0fe106f483d9afa73bd4e39a8a"),
+        ("pbkdf2", "448de1bad133e15acae1271040b8af1fb11f8ce97bf018fe49696b1a1d4820c1"),
+    ],
+)
+def test_a_passphrase_makes_the_key_of_a_ground_station(
+    tmp_path: Path, how: str, secret: str
+) -> None:
+    """As ``openssl dgst`` and ``openssl kdf`` make it, with QGroundControl's salt and rounds."""
+    ring = tmp_path / "keys.toml"
+    options = ("--role", "safety", "--passphrase", "--derivation", how)
+    assert keys("add", "qgc", *options, ring=ring, given=f"{PASSPHRASE}\n").status == 0
+    assert key_in(ring, "qgc").secret.hex() == secret
 
 
 MISTAKES = """add a --role boss => expected a role, one of observer

@@ -81,6 +81,7 @@ class Ways(NamedTuple):
     arms_in_hold: bool
     sub_modes: bool  # DO_SET_MODE names main and sub mode
     given_back: frozenset[int]  # modes in which a client lets the server drive: return, mission
+    throttles: tuple[int, ...] = (0,)  # MANUAL_CONTROL.z of a centred stick
 
     def mode_of(self, message: Any) -> int:
         """Return the mode that a DO_SET_MODE requests, -1 if it is invalid."""
@@ -101,6 +102,7 @@ PX4_WAYS = Ways(
     arms_in_hold=True,
     sub_modes=True,
     given_back=frozenset({4 << 16 | 4 << 24, 4 << 16 | 5 << 24}),
+    throttles=(0, 500),
 )
 
 
@@ -196,7 +198,7 @@ class Observer:
             self._see_command_of_client(now, message)
         elif kind == "SET_MODE":
             self._see_wish_of_client(now, message.custom_mode)
-        elif kind in BY_HAND and _off_centre(message):
+        elif kind in BY_HAND and _off_centre(message, self.ways.throttles):
             self._sticks_at = now
             if not self._brakes:  # else it is stopping already, and will be handed back
                 self._take_over(now, zeros=1)
@@ -599,9 +601,10 @@ def _moves(message: Any) -> bool:
     return any(not abs(speed) < 0.002 for speed in speeds)
 
 
-def _off_centre(message: Any) -> bool:
+def _off_centre(message: Any, throttles: tuple[int, ...]) -> bool:
     if message.get_type() == "MANUAL_CONTROL":
-        axes = (message.x, message.y, message.z, message.r)
+        throttle = min((message.z - centre for centre in throttles), key=abs)
+        axes = (message.x, message.y, throttle, message.r)
         return any(abs(a) > STICKS for a in axes if a != 0x7FFF)
     channels = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
     return any(abs(c - 1500) > STICKS for c in channels if c not in (0, 65535))

@@ -22,7 +22,7 @@ from tests.kit.store import LateStore
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
-WAYPOINT, SPEED, JUMP, SERVO, MODE = 16, 178, 177, 183, 176
+WAYPOINT, SERVO, MODE = 16, 183, 176
 START, SET_CURRENT = 300, 224
 HOME = Item(WAYPOINT, frame=0, current=1)
 COMPLETE = 5
@@ -94,14 +94,6 @@ DO_CHANGE_SPEED 1 -7 frame=2; : INVALID_PARAM2
     assert world.tasks() == ()
 
 
-def test_a_loop_in_which_nothing_is_driven_is_refused(world: World) -> None:
-    speed = Item(SPEED, param1=1, param2=0.5, frame=2)
-    jump = Item(JUMP, param1=2, param2=3, frame=2)
-    upload = uploaded(world, *PLAN[:2], speed, jump)
-    assert upload.result == 5
-    assert world.tasks() == ()
-
-
 def test_a_refused_plan_leaves_the_one_before(world: World) -> None:
     uploaded(world)
     uploaded(world, HOME, Item(MODE))
@@ -156,10 +148,6 @@ def test_after_a_stop_or_while_it_may_not_be_armed_a_start_is_refused(
     assert start(world) == (TEMPORARILY_REJECTED, reason)
 
 
-def test_a_start_without_a_plan_is_refused(world: World) -> None:
-    assert start(world) == (DENIED, R.NOT_FOUND)
-
-
 @for_each("how", ["command", "message"])
 def test_another_item_is_gone_on_with(world: World, how: str) -> None:
     uploaded(world)
@@ -176,6 +164,21 @@ def test_another_item_is_gone_on_with(world: World, how: str) -> None:
         assert currents(world.client)[before].seq == 3
     world.until_state(1, S.COMPLETED, within=60)
     assert reached(world.client) == [3]
+
+
+def test_the_item_of_a_start_is_shown_at_once_and_an_earlier_one_after_that(world: World) -> None:
+    uploaded(world, HOME, place(0.3, 0), place(0.3, 1))
+    start(world)
+    world.until_state(1, S.COMPLETED, within=30)
+    world.run(3)
+    world.client.send(set_current(2))
+    start(world)
+    world.until(lambda: currents(world.client)[-1].mission_id == 2, within=1)
+    assert currents(world.client)[-1].seq == 2
+    world.until_state(2, S.EXECUTING)
+    world.client.send(set_current(1))
+    assert world.shown(2).step == 0
+    assert currents(world.client)[-1].seq == 1
 
 
 def test_an_upload_ends_with_the_connection_of_its_client(world: World) -> None:

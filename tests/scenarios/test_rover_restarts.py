@@ -54,6 +54,7 @@ def test_it_is_told_what_to_do_and_positions_come_as_before(driving: World) -> N
     assert world.paused() is R.RESTARTED, "nobody took it over"
     assert sum(1.5 < p.at - at < 2.5 for p in world.client.of_id(POSITION)) >= 10
     texts = world.client.texts()
+    assert not any("taken over" in text for text in texts)
     assert "Queue paused: after a restart. Press Continue" in texts
     assert (
         "Rover 1 restarted: task 1 is held. Press"

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode
+from rover_sim.personas import Mode, Persona
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
@@ -18,8 +18,9 @@ from tests.kit.client import (
     setpoint,
     sticks,
 )
+from tests.kit.px4 import PROMPT_PX4
 from tests.kit.rows import ask
-from tests.kit.world import World, near_pose
+from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 ROWS = """operator hold
@@ -34,7 +35,7 @@ WAYS: dict[str, Callable[[World], object]] = {
     **{row: partial(ask, text=row) for row in ROWS.splitlines()},
     "disarm at the rover": lambda w: w.operator_arm(False),
     "sticks": lambda w: w.client.send(sticks(x=300)),
-    "throttle stick": lambda w: w.client.send(sticks(z=300)),
+    "throttle stick": lambda w: w.client.send(sticks(z=500)),
     "RC override": lambda w: w.client.send(rc_override(1500, 1500, 1700, 1500)),
     "setpoints of a second server": lambda w: w.from_vehicle_side(packed(setpoint(1.0), 250, 191)),
     "setpoints of anybody": lambda w: w.from_vehicle_side(packed(setpoint(1.0), 9, 9)),
@@ -94,11 +95,23 @@ def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, 
     world.until_idle(tasks=2)
 
 
-def test_sticks_at_rest_are_no_takeover(driving: World) -> None:
-    world = driving
-    world.client.stream(sticks(0, 0, 0, 0), rate=10)
+@for_each("persona, throttle", [(PROMPT, 0), (PROMPT_PX4, 0), (PROMPT_PX4, 500)])
+def test_sticks_at_rest_are_no_takeover(
+    make_world: MakeWorld, persona: Persona, throttle: int
+) -> None:
+    """A PX4 takes 500 for no throttle: QGroundControl's, unless its stick is zero at the centre."""
+    world = make_world(persona=persona)
+    world.client.move(2)
+    world.client.stream(sticks(z=throttle), rate=10)
     world.client.stream(rc_override(1500, 1500, 1510, 0), rate=10)
-    world.until_state(1, S.COMPLETED)
+    world.run(3)
+    assert world.state(1)[0] is S.EXECUTING
+    if throttle:
+        world.client.send(sticks(z=0))
+        world.run(0.1)
+        assert world.state(1) == (S.PAUSED, R.TAKEOVER), "full reverse"
+    else:
+        world.until_state(1, S.COMPLETED)
 
 
 @for_each("arming", ["server", "operator"])

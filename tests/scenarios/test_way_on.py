@@ -126,7 +126,8 @@ def test_hold_and_a_click_replace_the_click_before(
         party.operator.go_to(*degrees(0, 3))
         world.run(2)
         assert world.state(2)[0] is S.QUEUED, "the person at the rover has it"
-        assert any("press Continue, or set Hold and click again" in t for t in party_texts(party))
+        told = texts(party, since=0.0, worst=6)
+        assert any("press Continue, or set Hold and click again" in text for text in told)
     choose(world, party, Mode.HOLD)
     world.run(2)
     party.operator.go_to(*degrees(0, 1))
@@ -136,7 +137,3 @@ def test_hold_and_a_click_replace_the_click_before(
     assert {world.state(each) for each in range(1, task)} == {(S.CANCELLED, R.REPLACED)}
     assert world.paused() is R.NONE
     party.check()
-
-
-def party_texts(party: QgcParty) -> list[str]:
-    return [each.text for each, _ in party.qgc.screen.texts]

@@ -105,6 +105,8 @@ class GcsClient:
         self.introduced: set[int] = set()
         #: until when it gets no MISSION_CURRENT, s: it was refused an item
         self.gives_up_at = -inf
+        #: the value of a centred throttle stick that its MANUAL_CONTROL.z was last nearest to
+        self.throttle_centre: int | None = None
         #: by role, limited key and rate, which may change: the limits of requests, and of changes
         self._limits_of: dict[tuple[str, str, float], tuple[TokenBucket, TokenBucket]] = {}
         self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE)

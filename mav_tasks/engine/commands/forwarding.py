@@ -38,6 +38,7 @@ from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, STOP_IN_FORCE, TaskReason
 
 NO_PLACE = 7  # type_mask that ignores x, y and z
 STICKS_CENTRED = 50  # of ±1000 (MANUAL_CONTROL) or µs around 1500 (RC override)
+NO_STICK = 0x7FFF
 RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
 #: the one reason why the setpoints of a client do not pass that may drive
@@ -108,7 +109,10 @@ def passed(
     """Note the effect on the tasks of a packet that is forwarded to the vehicle."""
     if row.needs_grant:
         vehicle.parts.authority.note_client(client.key, now=now)
-    elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
+    elif isinstance(message, m.ManualControl):
+        if _has_moved(message, client, vehicle.persona.centred_throttles):
+            vehicle.joint.sticks_moved(actor=str(client.who), now=now)
+    elif isinstance(message, m.RcChannelsOverride) and _is_off_centre(message):
         vehicle.joint.sticks_moved(actor=str(client.who), now=now)
 
 
@@ -132,11 +136,16 @@ def _is_finite(message: m.Message) -> bool:
     )
 
 
-def _off_centre(message: m.ManualControl | m.RcChannelsOverride) -> bool:
-    """Whether a stick is off its centre: a person drives."""
-    if isinstance(message, m.ManualControl):
-        sticks = (message.x, message.y, message.z, message.r)  # z is a rover's throttle
-        return any(abs(s) > STICKS_CENTRED for s in sticks if s != 0x7FFF)
+def _has_moved(message: m.ManualControl, client: GcsClient, throttles: Iterable[int]) -> bool:
+    """Whether a stick is off its centre, or the throttle has jumped from one centre to another."""
+    centre = min((*throttles, NO_STICK), key=lambda each: abs(message.z - each))
+    before, client.throttle_centre = client.throttle_centre, centre
+    sticks = (message.x, message.y, message.z - centre, message.r)
+    is_off = any(abs(stick) > STICKS_CENTRED for stick in sticks if stick != NO_STICK)
+    return is_off or before not in (None, centre)
+
+
+def _is_off_centre(message: m.RcChannelsOverride) -> bool:
     channels = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
     return any(abs(c - RC_CENTRE) > STICKS_CENTRED for c in channels if c not in RC_IGNORED)
 

@@ -315,7 +315,7 @@ def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
     """Return the present item of a plan, or else the present leg; and the number of them."""
     if isinstance(goal, Plan):
         count = goal.item_count
-        step = goal.item_number(max(progress.step, goal.first)) - 1
+        step = goal.item_number(goal.present_step(progress.step)) - 1
         return min(max(step, 0), max(count - 1, 0)), count
     return progress.leg, goal.leg_count
 

@@ -292,8 +292,7 @@ class Plans:
             plan_id, count = task.id, len(task.goal.steps)
             if chosen is None or task.state not in TERMINAL:  # else that is for the next start
                 state = STATES.get(task.state, NOT_STARTED)
-                if task.progress.step >= 0:
-                    at = min(task.progress.step, max(count - 1, 0))
+                at = min(task.goal.present_step(task.progress.step), max(count - 1, 0))
         return m.MissionCurrent(
             at if seq is None else seq,
             count,

@@ -57,6 +57,8 @@ class Persona:
     #: in our mode it drives as fast as set-point or throttle stick asks, whichever is more; a stick
     #: against the direction that is asked for does not count
     heeds_throttle_stick: bool
+    #: MANUAL_CONTROL.z of a station whose throttle stick is centred
+    centred_throttles: tuple[int, ...]
     #: an integer's bytes stand in a PARAM_VALUE's float; else the integer is cast
     has_bytewise_parameters: bool
     cruise_parameters: tuple[str, ...]  # m/s, of what names no speed
@@ -161,6 +163,7 @@ ARDUPILOT = Persona(
     has_loss_failsafe=False,  # it stops after 3 s (observed on 4.6.3)
     honours_yaw_rate=True,
     heeds_throttle_stick=True,  # 4.6.3
+    centred_throttles=(0,),  # 500 is half throttle ahead
     has_bytewise_parameters=False,
     cruise_parameters=("WP_SPEED", "CRUISE_SPEED"),
     turning_parameters=(
@@ -219,6 +222,9 @@ PX4 = Persona(
     has_loss_failsafe=True,
     honours_yaw_rate=False,
     heeds_throttle_stick=False,
+    # it reads 0 to 1000 as full reverse to full ahead; stations whose stick has its zero at the
+    # centre send 0 all the same
+    centred_throttles=(0, 500),
     has_bytewise_parameters=True,
     cruise_parameters=("RO_SPEED_LIM",),
     turning_parameters=("CA_AIRFRAME", "SYS_AUTOSTART", "RA_WHEEL_BASE", "RA_MAX_STR_ANG"),

@@ -199,10 +199,12 @@ class Takeovers:
     def _judge(self, by_person: Callable[[float], None], *, now: float) -> None:
         """Take a change for a person's, unless a restart may have caused it: then it waits.
 
-        The first heartbeat may come before a message with its clock, which tells of the restart.
+        The first heartbeat may come before a message with its clock, which tells of the restart. A
+        task that waits for positions goes on by them only, and they carry the clock.
         """
-        parts = self._parts
-        if parts.monitor.armed or parts.tasks.active or parts.authority.has_any_grant:
+        parts, task = self._parts, self._parts.tasks.active
+        is_driven = task is not None and task.reason not in (R.LINK_LOST, R.POSITION_LOST)
+        if parts.monitor.armed or is_driven or parts.authority.has_any_grant:
             by_person(now)
         else:
             parts.undecided.append(by_person)

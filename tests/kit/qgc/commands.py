@@ -42,15 +42,7 @@ class Command:
     handler: Handler | None
     tries: int = 1
     result: int | None = None
-    ack: Message = None
     acked_at: float | None = None
-    is_refused_here: bool = False  # never sent: another one with its number is pending
-
-    @property
-    def task_id(self) -> int:
-        """``result_param2``, which the station itself ignores."""
-        assert self.ack is not None, f"no ack: {self.message}"
-        return int(self.ack.result_param2)
 
     @property
     def took(self) -> float:
@@ -67,8 +59,6 @@ class CommandQueue:
         self._pending: list[Command] = []
         self._is_checking = False
         self.sent: list[Command] = []
-        #: acks without a pending command; a correct server causes none
-        self.strays: list[Message] = []
         self._silent_modes_until = 0.0
 
     def send_long(
@@ -117,15 +107,14 @@ class CommandQueue:
         if found is None:
             is_of_mode = ack.command in (11, 176)
             if not (is_of_mode and self._core.timers.now <= self._silent_modes_until):
-                self.strays.append(ack)
                 self._core.violation(f"an ack that nothing waits for: {ack}")
             return
-        if ack.result == IN_PROGRESS and self._core.profile.in_progress != "final":
+        if ack.result == IN_PROGRESS:
             found.max_tries = 1
             if self._core.profile.in_progress == "restarts":
                 found.at = self._core.timers.now
             return
-        found.ack, found.acked_at = ack, self._core.timers.now
+        found.acked_at = self._core.timers.now
         self._end(found, ack.result)
 
     def _send(
@@ -137,7 +126,6 @@ class CommandQueue:
         command = Command(message, component, number, now, tries, shows, handler)
         same = [c for c in self._pending if (c.component, c.number) == (component, number)]
         if same and number not in MAY_OVERLAP:
-            command.is_refused_here = True
             if shows:
                 self._core.popup(
                     "Unable to send command: Waiting on previous response to same command."

@@ -69,20 +69,6 @@ class Connecting:
             return
         self.is_complete = True
 
-    def _ask(self, name: str, number: int, then: Callable[[Message], None]) -> None:
-        """Request once, and again without an answer in versions that do so."""
-        is_again = not self._core.profile.tries_states_again
-
-        def done(message: Message, is_answered: bool) -> None:
-            nonlocal is_again
-            if message is None and not is_answered and not is_again:
-                is_again = True
-                self._requests.ask(name, number, done)
-            else:
-                then(message)
-
-        self._requests.ask(name, number, done)
-
     def _version(self, then: Next) -> None:
         def done(message: Message) -> None:
             if message is None:  # [1.3]
@@ -94,7 +80,7 @@ class Connecting:
                 self._plans.capabilities = message.capabilities
             then()
 
-        self._ask("AUTOPILOT_VERSION", 148, done)
+        self._requests.ask("AUTOPILOT_VERSION", 148, done)
 
     def _protocol(self, then: Next) -> None:
         def done(message: Message) -> None:
@@ -104,7 +90,7 @@ class Connecting:
                 self._core.violation("the whole link fell back to MAVLink 1")
             then()
 
-        self._ask("PROTOCOL_VERSION", 300, done)
+        self._requests.ask("PROTOCOL_VERSION", 300, done)
 
     def _modes(self, then: Next) -> None:
         """Request the modes one by one, up to the number in the first answer [1.3]."""
@@ -112,7 +98,7 @@ class Connecting:
         def ask(index: int) -> None:
             self._requests.ask("AVAILABLE_MODES", 435, done, index=index)
 
-        def done(message: Message, _is_answered: bool) -> None:
+        def done(message: Message) -> None:
             if message is not None and message.mode_index < message.number_modes:
                 ask(message.mode_index + 1)
             else:
@@ -121,27 +107,20 @@ class Connecting:
         ask(1)
 
     def _metadata(self, then: Next) -> None:
-        self._ask("COMPONENT_METADATA", 397, lambda _: then())
+        self._requests.ask("COMPONENT_METADATA", 397, lambda _: then())
 
     def _older_metadata(self, then: Next) -> None:
-        self._ask("COMPONENT_INFORMATION", 395, lambda _: then())
+        self._requests.ask("COMPONENT_INFORMATION", 395, lambda _: then())
 
     def _parameters(self, then: Next) -> None:
         self._after_parameters = then
-        given_up = self._core.profile.parameters_given_up
-        if given_up is not None:
-            self._core.timers.after(given_up, self._leave_parameters)
         self.parameters.load()
 
     def _parameters_ready(self) -> None:
         for _ in range(2):  # [1.3], [11.1]
             self._core.send(mavlink.MAVLink_system_time_message(0, 0))
-        self._leave_parameters()
-
-    def _leave_parameters(self) -> None:
-        then, self._after_parameters = self._after_parameters, None
-        if then is not None:
-            then()
+        assert self._after_parameters is not None, "they are ready once"
+        self._after_parameters()
 
     def _missions(self, then: Next) -> None:
         self._plans.download(then)

@@ -80,7 +80,6 @@ class PlanMaster:
             FENCE: plan.fence_items(),
             RALLY: plan.rally_items(),
         }
-        self._vehicle.plan_completed = False
         self._each(lambda kind, done: self.managers[kind].write(items[kind], done))
 
     def download(self, then: Callable[[], None] = lambda: None) -> None:

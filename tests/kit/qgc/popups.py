@@ -21,8 +21,6 @@ class Screen:
         self.popups: list[Shown] = []
         #: texts of the vehicle up to a warning, with their severity
         self.texts: list[tuple[Shown, int]] = []
-        #: legitimate questions to the person: "Flight Plan complete"
-        self.dialogs: list[Shown] = []
         #: in the bar, and spoken: link lost or regained
         self.notices: list[Shown] = []
         #: not shown: what no ground station should receive, or have to do

@@ -12,14 +12,12 @@ class Profile:
     name: str
     ack_timeout: float  # [2.2]; checked each half second
     restarts_timer: bool  # a repeated command gets the whole time again; [11.1]: 4.x does not
-    in_progress: str  # [2.4]: "restarts" the time, is "kept" pending, or is "final"
+    in_progress: str  # [2.4]: "restarts" the time, or is "kept" pending
     asks_protocol_version: bool  # [1.3]: of PX4 and generic; no answer: MAVLink 1
     asks_modes: bool  # [1.3] AVAILABLE_MODES
     asks_gimbals: bool  # [1.3] of each component; [11.1]: 4.x does not
     checks_hash: bool  # [1.4] PX4's _HASH_CHECK before the list; [11.1]: 4.x does not
     hears_mavlink1: bool  # [1.1]: master ignores MAVLink 1 except heartbeats
-    tries_states_again: bool  # [1.3]: a connection state without an answer is tried a second time
-    parameters_given_up: float | None  # [1.4]: s until it continues without them; None: never
     streams_at_once: bool  # [1.2] ArduPilot's data streams; [11.3]: 4.x one each half second
     intervals: tuple[int, ...]  # [1.2], [11.3]: requested from ArduPilot at 1 Hz
     sets_item_by_command: bool  # [2.5], [11.4]
@@ -35,8 +33,6 @@ V4 = Profile(
     asks_gimbals=False,
     checks_hash=False,
     hears_mavlink1=True,
-    tries_states_again=False,
-    parameters_given_up=None,
     streams_at_once=False,
     intervals=(HOME_POSITION,),
     sets_item_by_command=False,
@@ -51,8 +47,6 @@ MASTER = Profile(
     asks_gimbals=True,
     checks_hash=True,
     hears_mavlink1=False,
-    tries_states_again=True,
-    parameters_given_up=120.0,
     streams_at_once=True,
     intervals=(HOME_POSITION, EXTENDED_SYS_STATE),
     sets_item_by_command=True,

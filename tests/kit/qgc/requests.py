@@ -11,8 +11,8 @@ from tests.kit.qgc.wire import Message
 
 MESSAGE_AFTER_ACK = 1.0  # s [1.3]
 
-#: called with the message or None, and whether there was an answer at all
-Done = Callable[[Message, bool], None]
+#: called with the message, or None
+Done = Callable[[Message], None]
 
 
 class _Request(NamedTuple):
@@ -48,7 +48,7 @@ class MessageRequests:
             return
         self._came.setdefault(component, message)
         if component in self._is_acked:
-            self._end(component, is_answered=True)
+            self._end(component)
 
     def _next(self, component: int) -> None:
         if component in self._current or not self._waiting[component]:
@@ -64,18 +64,18 @@ class MessageRequests:
 
     def _acked(self, component: int, result: int | None) -> None:
         if result != ACCEPTED or component in self._came:
-            self._end(component, is_answered=result is not None)
+            self._end(component)
             return
         self._is_acked.add(component)
         self._timers[component] = self._core.timers.after(
-            MESSAGE_AFTER_ACK, lambda: self._end(component, is_answered=False)
+            MESSAGE_AFTER_ACK, lambda: self._end(component)
         )
 
-    def _end(self, component: int, *, is_answered: bool) -> None:
+    def _end(self, component: int) -> None:
         request = self._current.pop(component)
         self._is_acked.discard(component)
         timer = self._timers.pop(component, None)
         if timer is not None:
             timer.cancel()
-        request.done(self._came.pop(component, None), is_answered)
+        request.done(self._came.pop(component, None))
         self._next(component)

@@ -48,12 +48,7 @@ class Session:
         message, name, (_, component) = heard
         self._heard()
         if component == AUTOPILOT:
-            self.state.receive(name, message, now=self._core.timers.now)
-            if self.state.plan_completed:
-                self.state.plan_completed = False
-                self._core.screen.dialogs.append(
-                    Shown(self._core.timers.now, "Flight Plan complete")
-                )
+            self.state.receive(name, message)
         self._requests.receive(name, message, component)
         match name:
             case "HEARTBEAT":
@@ -111,7 +106,7 @@ class Session:
             return
         self._gimbals_asked[component] = asked + 1
 
-        def done(message: Message, is_answered: bool) -> None:
+        def done(message: Message) -> None:
             if message is not None:
                 self._gimbals_asked[component] = GIMBAL_TRIES
 

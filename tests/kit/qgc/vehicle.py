@@ -41,13 +41,11 @@ class VehicleState:
 
     def __init__(self, heartbeat: Message, *, now: float) -> None:
         self.firmware = FIRMWARE.get(heartbeat.autopilot, GENERIC)
-        self.heard_at = self.beat_at = now
+        self.heard_at = now
         self.landed_state = 0  # unknown
         self.place: Place | None = None
         self.relative_altitude = nan
         self.home: Place | None = None
-        self.mission_seen_armed = False
-        self.plan_completed = False
         self._take_heartbeat(heartbeat)
 
     @property
@@ -67,10 +65,9 @@ class VehicleState:
             return self.armed and self.status in (ACTIVE, CRITICAL, EMERGENCY)
         return self.landed_state in NOT_LANDED
 
-    def receive(self, name: str, message: Message, *, now: float) -> None:
+    def receive(self, name: str, message: Message) -> None:
         """Take a message of component 1."""
         if name == "HEARTBEAT":
-            self.beat_at = now
             self._take_heartbeat(message)
         elif name == "EXTENDED_SYS_STATE":
             self.landed_state = message.landed_state
@@ -89,8 +86,3 @@ class VehicleState:
         self.mode: int = message.custom_mode
         self.status: int = message.system_status
         self.armed = bool(message.base_mode & ARMED)
-        if self.armed and self.is_in_mission_mode:
-            self.mission_seen_armed = True
-        elif not self.armed and self.mission_seen_armed:  # [11.8]
-            self.mission_seen_armed = False
-            self.plan_completed = True

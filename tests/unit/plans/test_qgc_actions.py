@@ -2,6 +2,7 @@
 
 import json
 import re
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ from typer.testing import CliRunner
 
 from mav_tasks.basics.errors import UsageError
 from mav_tasks.cli.app import app
-from mav_tasks.plans.qgc_actions import ACTIONS, FILE_TYPES, file_of, parse_action
+from mav_tasks.plans.qgc_actions import ACTIONS, FILE_TYPES, parse_action
+from tests.kit.cases import for_each
 
 MOVE, STOP = 54000, 54003
 
@@ -30,14 +32,8 @@ def read(text: str, file_type: str) -> list[dict[str, Any]]:
         assert isinstance(action["compId"], int)
         assert all(isinstance(action[f"param{n}"], float) for n in range(1, 8))
     found: list[dict[str, Any]] = file["actions"]
+    assert len({action["label"] for action in found}) == len(found)
     return found
-
-
-def test_the_file_can_be_read() -> None:
-    for file_type in FILE_TYPES:
-        actions = read(file_of(ACTIONS, file_type=file_type), file_type)
-        assert {action["compId"] for action in actions} == {191}
-        assert len({action["label"] for action in actions}) == len(actions) == len(ACTIONS)
 
 
 def test_an_action_of_ones_own() -> None:
@@ -75,9 +71,16 @@ def test_it_is_printed_in_either_format() -> None:
     assert (only["label"], only["compId"]) == ("Horn", 192)
 
 
-def test_both_are_installed_where_it_looks(tmp_path: Path) -> None:
+@for_each("programs", [["QGroundControl"], ["QGroundControl", "QGroundControl Daily"]])
+def test_both_are_installed_where_it_looks(tmp_path: Path, programs: list[str]) -> None:
+    """A daily build has a folder of its own."""
+    for program in programs[1:]:
+        (tmp_path / program).mkdir()
     said = run("--install", "--documents", str(tmp_path))
-    for file_type in FILE_TYPES:
-        path = tmp_path / "QGroundControl" / file_type / "mav-tasks.json"
+    for program, file_type in product(programs, FILE_TYPES):
+        path = tmp_path / program / file_type / "mav-tasks.json"
         assert f"wrote {path}" in said
-        assert len(read(path.read_text(encoding="utf-8"), file_type)) == len(ACTIONS)
+        actions = read(path.read_text(encoding="utf-8"), file_type)
+        assert [action["compId"] for action in actions] == [191] * len(ACTIONS)
+    assert said.count("wrote") == len(programs) * len(FILE_TYPES)
+    assert "Enable Custom Actions" in said
