@@ -91,9 +91,10 @@ def test_the_lines_of_the_guide_install_a_service_that_serves(tmp_path: Path) ->
         assert server.popen.returncode == 0
     assert (home / "tasks.sqlite3").is_file()
 
-    (keys,) = re.findall(r"`(sudo -u [^`]*keys) list`", SERVICE)
+    (as_user,) = re.findall(r"`(sudo -u [^`]*) …`", SERVICE)
+    keys = f"{as_user} {program} keys"
     for command in ("add tester --role operator", "list"):
-        line, secret = f"{here(keys)} {command}", "a passphrase for a test"
+        line, secret = f"{keys} {command}", "a passphrase for a test"
         done = subprocess.run(
             ["bash", "-euc", line],
             cwd=tmp_path,
