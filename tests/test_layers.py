@@ -28,11 +28,13 @@ client: basics mavlink links config plans kinds tasks engine
 web: basics mavlink config plans kinds tasks engine store recording metrics shell client
 agents: basics mavlink config kinds tasks shell client
 probe: basics mavlink links config kinds tasks engine client
-cli: basics mavlink links config plans kinds tasks store recording shell client web agents probe
 rover_sim: basics config links mavlink
 rover_sim.testing: client shell kinds links mavlink rover_sim config store tasks
-rover_sim.field_trial: client basics kinds links tasks
+rover_sim.observing: client links mavlink
+rover_sim.trial: basics client kinds links tasks rover_sim.observing
 rover_sim.demo: client basics shell kinds links recording rover_sim config tasks
+cli: basics mavlink links config plans kinds tasks store recording shell client web agents probe \
+rover_sim.trial
 """
 
 
@@ -120,8 +122,8 @@ def layer_of(module: str) -> str | None:
     """The rule that a module falls under, or None for what is not ours."""
     parts = module.split(".")
     if parts[0] == "rover_sim":
-        parts = parts[:2] if parts[1:2] in (["testing"], ["demo"], ["field_trial"]) else parts[:1]
-        return ".".join(parts)
+        room = ".".join(parts[:2])
+        return room if room in MAY_IMPORT else parts[0]
     return ".".join(parts[:2]) if parts[0] == "mav_tasks" and len(parts) > 1 else None
 
 

@@ -1,4 +1,4 @@
-"""The table of ``tools/field_trial`` on simulated rovers as they are by default, in virtual time.
+"""The table of ``mav-tasks trial`` on simulated rovers as they are by default, in virtual time.
 
 Each row has a rover of its own that has just been switched on.
 """
@@ -6,11 +6,9 @@ Each row has a rover of its own that has just been switched on.
 import pytest
 
 from mav_tasks.basics.errors import UsageError
-from rover_sim.field_trial.ground import Limits
-from rover_sim.field_trial.rows import Row, Verdict, table
-from rover_sim.field_trial.rows_run import run_rows
-from rover_sim.field_trial.session import Session
 from rover_sim.frames import Frame
+from rover_sim.trial.rows import Row, Verdict, run_rows, table
+from rover_sim.trial.session import Limits, Session
 from tests.kit.trial_ground import MAKES, Make, TrialGround
 
 #: by default, and what each kind of rover can do
@@ -28,40 +26,31 @@ CASES = [("ardupilot skid", name) for name in (*NAMES, "stick")] + [
 ]
 
 
-def trial(make: str, row: str) -> list[Row]:
+def trial(make: Make, row: str, limits: Limits) -> list[Row]:
     """Run one row on a new rover."""
-    ground = TrialGround(MAKES[make])
-    said: list[str] = []
+    ground = TrialGround(make)
+    rows: list[Row] = []
 
-    async def run() -> list[Row]:
-        session = Session(ground, limits=LIMITS[make], say=said.append)
+    async def run() -> None:
+        session = Session(ground, limits, print)
         try:
-            return list(await run_rows(session, (row,)))
+            await run_rows(session, (row,), done=rows.append)
         finally:
             await session.end()
 
-    rows = ground.run(run())
-    print(*said, *table(rows), sep="\n")  # shown where it fails
+    ground.run(run())
+    print(*table(rows), sep="\n")  # shown where it fails
     return rows
 
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(("make", "row"), CASES)
 def test_a_rover_as_it_is_holds_the_table(make: str, row: str) -> None:
-    rows = trial(make, row)
+    rows = trial(MAKES[make], row, LIMITS[make])
     assert rows
     assert {each.verdict for each in rows} == {Verdict.PASS}
 
 
 def test_a_rover_whose_failsafe_is_not_set_ends_the_trial_at_once() -> None:
-    ground = TrialGround(Make("px4", Frame.DIFFERENTIAL))
-
-    async def run() -> list[Row]:
-        session = Session(ground, limits=LIMITS["px4 differential"], say=print)
-        try:
-            return list(await run_rows(session, ("restart",)))
-        finally:
-            await session.end()
-
     with pytest.raises(UsageError, match="mav-tasks probe --set-failsafe"):
-        ground.run(run())
+        trial(Make("px4", Frame.DIFFERENTIAL), "restart", Limits())
