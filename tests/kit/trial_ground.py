@@ -87,7 +87,7 @@ class TrialGround(Ground):
         net, numbers, truth = MemoryNet(seed=seed), count(), Track()
         world = self._world = VirtualWorld(net)
         body = kinematic_body(make.frame, start=Pose(), slip=SLIP, seed=seed)
-        vehicle = self._vehicle = make_vehicle(
+        vehicle = self.vehicle = make_vehicle(
             body, system_id=1, now=0.0, persona=persona, realism=realism, seed=seed
         )
         for name, value in make.parameters:
@@ -115,10 +115,10 @@ class TrialGround(Ground):
             return runner.run(trial)
 
     async def reboot(self) -> None:
-        self._vehicle.autopilot.reboot(now=self._world.now)
+        self.vehicle.autopilot.reboot(now=self._world.now)
 
     can_push_stick = True
 
     def push_stick(self, throttle: int | None) -> None:
         pulse = NEUTRAL if throttle is None else throttle
-        self._vehicle.autopilot.operator_pulses(pulse, NEUTRAL)
+        self.vehicle.autopilot.operator_pulses(pulse, NEUTRAL)

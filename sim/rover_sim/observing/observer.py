@@ -30,13 +30,9 @@ class Heard(NamedTuple):
     """A message with the time at which it came, and its packet."""
 
     at: float
-    message: Any  # pymavlink's
+    name: str  # "UNKNOWN_54000" of one that pymavlink does not know
+    message: Any  # pymavlink's; None of one that it does not know
     packet: Packet
-
-    @property
-    def name(self) -> str:
-        """The message's name."""
-        return str(self.message.get_type())
 
 
 class Answer(NamedTuple):
@@ -74,7 +70,7 @@ class Observer:
     ) -> None:
         """``keeps``: remember every message in ``log``, not only the last of each kind."""
         self.out: Any = mav.MAVLink(self, *source)
-        self.system = 0  # of the autopilot; 0: not heard yet
+        self.system = 0  # of the first autopilot that was heard
         self.last: dict[str, Heard] = {}
         self.log: list[Heard] = []
         self.answers: list[Answer] = []
@@ -82,10 +78,9 @@ class Observer:
         #: called with each message of the autopilot
         self.listeners: list[Callable[[Heard], None]] = []
         self._keeps = keeps
-        self._waiting: list[tuple[str, Callable[[Any], object], asyncio.Future[Any]]] = []
+        self._waiting: list[tuple[list[str], Callable[[Any], object], asyncio.Future[Any]]] = []
         self._pulses: Iterator[int] = iter(())
         self._beat_at, self._stick_at = 0.0, inf
-        self.out.robust_parsing = True
         self._link = LinkDriver(link, self, signatures=None)
         self._link.begin()
 
@@ -134,11 +129,11 @@ class Observer:
         return self.answers[-1]
 
     async def wait(
-        self, name: str, within: float, fits: Callable[[Any], object] = lambda _: True
+        self, names: str, within: float, fits: Callable[[Any], object] = lambda _: True
     ) -> Any:
-        """Return the next message of this name that fits, or None if none comes in time."""
+        """Return the next message with one of the names that fits, or None in time."""
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._waiting.append((name, fits, future))
+        self._waiting.append((names.split(), fits, future))
         try:
             return await asyncio.wait_for(future, within)
         except TimeoutError:
@@ -157,7 +152,7 @@ class Observer:
 
     async def found(self, within: float) -> bool:
         """Wait for the first heartbeat of an autopilot; return whether it came in time."""
-        return self.system != 0 or await self.wait("HEARTBEAT", within) is not None
+        return "HEARTBEAT" in self.last or await self.wait("HEARTBEAT", within) is not None
 
     def push_stick(self, throttle: int | None) -> None:
         """Hold the throttle at a pulse (µs) by RC_CHANNELS_OVERRIDE; None releases it."""
@@ -177,8 +172,15 @@ class Observer:
 
     def receive(self, packet: Packet, *, now: float) -> None:
         """Read a packet, and remember it if it is the autopilot's."""
-        for message in self.out.parse_buffer(packet.raw) or ():
-            self._take(Heard(now, message, packet))
+        name, message = f"UNKNOWN_{packet.message_id}", None
+        if packet.message_id in mav.mavlink_map:
+            try:
+                message = self.out.decode(bytearray(packet.raw))
+            except mav.MAVError:
+                self.damaged += 1
+                return
+            name = str(message.get_type())
+        self._take(Heard(now, name, message, packet))
 
     def next_deadline(self) -> float:
         """Return when to send next by itself."""
@@ -202,19 +204,17 @@ class Observer:
 
     def _take(self, heard: Heard) -> None:
         name, source = heard.name, heard.packet.source
-        if name == "BAD_DATA":
-            self.damaged += 1
-            return
         is_autopilot = source.component_id == AUTOPILOT
-        if not self.system and name == "HEARTBEAT" and is_autopilot:
-            self.system = 0 if heard.message.type in NO_VEHICLES else source.system_id
+        is_station = name == "HEARTBEAT" and heard.message.type in NO_VEHICLES
+        if not self.system and is_autopilot and not is_station:
+            self.system = source.system_id
         if source.system_id != self.system or not (is_autopilot or name == "COMMAND_ACK"):
             return
         self.last[name] = heard
         if self._keeps:
             self.log.append(heard)
         for wanted, fits, future in self._waiting:
-            if wanted == name and not future.done() and fits(heard.message):
+            if name in wanted and not future.done() and fits(heard.message):
                 future.set_result(heard.message)
         for listener in self.listeners:
             listener(heard)

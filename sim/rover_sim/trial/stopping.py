@@ -42,7 +42,7 @@ async def measure(session: Session) -> float | None:
     except Interference as error:
         session.say(f"  not measured: {error}")
     finally:
-        if observer.system:
+        if observer.message("HEARTBEAT") is not None:
             await driver.rest()
         observer.close()
     for way, values in distances.items():
