@@ -43,6 +43,7 @@ class Answer(NamedTuple):
     asked_at: float
     result: int | None  # MAV_RESULT; None: no answer
     took: float  # s
+    extra: int = 0  # result_param2
 
     @property
     def is_accepted(self) -> bool:
@@ -75,7 +76,7 @@ class Observer:
         self.log: list[Heard] = []
         self.answers: list[Answer] = []
         self.damaged = 0  # packets that pymavlink refuses
-        #: called with each message of the autopilot
+        #: called with each message of the autopilot's system
         self.listeners: list[Callable[[Heard], None]] = []
         self._keeps = keeps
         self._waiting: list[tuple[list[str], Callable[[Any], object], asyncio.Future[Any]]] = []
@@ -111,21 +112,22 @@ class Observer:
         """Send a message that ``out`` has encoded."""
         self.out.send(message)
 
-    async def command(self, number: int, *params: float, system: int | None = None) -> Answer:
-        """Send a COMMAND_LONG to the autopilot and return its answer."""
+    async def command(
+        self, number: int, *params: float, system: int | None = None, component: int = AUTOPILOT
+    ) -> Answer:
+        """Send a COMMAND_LONG, by default to the autopilot, and return its answer."""
         filled = (*params, *(0.0,) * (7 - len(params)))
-        target = self.system if system is None else system
-        return await self.ask(
-            self.out.command_long_encode(target, AUTOPILOT, number, 0, *filled), filled
-        )
+        target = (self.system if system is None else system, component)
+        return await self.ask(self.out.command_long_encode(*target, number, 0, *filled), filled)
 
     async def ask(self, message: Any, params: tuple[float, ...] = ()) -> Answer:
         """Send a COMMAND_LONG or COMMAND_INT and return the answer."""
         began = self.now
         self.send(message)
         ack = await self.wait("COMMAND_ACK", PATIENCE, lambda ack: ack.command == message.command)
-        result = None if ack is None else int(ack.result)
-        self.answers.append(Answer(message.command, params, began, result, self.now - began))
+        seen = (None, 0) if ack is None else (int(ack.result), int(ack.result_param2))
+        took = self.now - began
+        self.answers.append(Answer(message.command, params, began, seen[0], took, seen[1]))
         return self.answers[-1]
 
     async def wait(
@@ -208,7 +210,11 @@ class Observer:
         is_station = name == "HEARTBEAT" and heard.message.type in NO_VEHICLES
         if not self.system and is_autopilot and not is_station:
             self.system = source.system_id
-        if source.system_id != self.system or not (is_autopilot or name == "COMMAND_ACK"):
+        if source.system_id != self.system:
+            return
+        for listener in self.listeners:
+            listener(heard)
+        if not (is_autopilot or name == "COMMAND_ACK"):
             return
         self.last[name] = heard
         if self._keeps:
@@ -216,5 +222,3 @@ class Observer:
         for wanted, fits, future in self._waiting:
             if name in wanted and not future.done() and fits(heard.message):
                 future.set_result(heard.message)
-        for listener in self.listeners:
-            listener(heard)

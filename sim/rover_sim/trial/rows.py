@@ -75,7 +75,7 @@ KINDS = (
     Kind(
         "tasks",
         "30 tasks",
-        "36 m ahead, 12 m behind and 18 m to each side of where it stands",
+        "36 m ahead, 15 m behind and 18 m to each side of where it stands",
         tasks.drive_tasks,
     ),
     *(
