@@ -3,9 +3,7 @@
 import math
 import re
 import statistics
-from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -61,7 +59,6 @@ def figures_of(trace: Trace) -> dict[tuple[str, str], Value]:
         "Start": _start(trace),
         "Standing disarmed": _standing(trace, STANDING_DISARMED),
         "Standing armed": _standing(trace, STANDING_ARMED),
-        "Estimate and truth": _estimate(trace),
         "Origin and home": _home(trace),
         **{mark: _motion(trace, mark) for _, mark in trace.marks[:-1]},
     }
@@ -169,38 +166,6 @@ def _standing(trace: Trace, mark: str) -> Named:
     if mark == STANDING_ARMED:
         zeros = trace.poses(Span(trace.span(READYING).begin, span.end))
         yield "turned by the first streamed zeros", abs(_turned(zeros))
-
-
-def _estimate(trace: Trace) -> Named:
-    span = Span(trace.span(STANDING_ARMED).begin, trace.marks[-1][0])
-    poses = trace.poses(span)
-    smooth = _unwrapped([pose.yaw for pose in poses])
-    poses = [replace(pose, yaw=yaw) for pose, yaw in zip(poses, smooth, strict=True)]
-    times = [pose.time for pose in poses]
-    moving, turning = [], []
-    for name in ("LOCAL_POSITION_NED", "ATTITUDE"):
-        for each in trace.messages(name, span)[::EVERY]:
-            at = bisect_left(times, each.at)
-            if not 0 < at < len(times):
-                continue
-            true, m = _between(poses[at - 1], poses[at], each.at), each.message
-            if name == "ATTITUDE":
-                turning.append(abs(math.degrees(math.remainder(m.yaw - true.yaw, math.tau))))
-            else:
-                vn, ve = true.speed * math.cos(true.yaw), true.speed * math.sin(true.yaw)
-                moving.append(math.hypot(m.vx - vn, m.vy - ve))
-    yield from _spread("reported velocity off the true one", moving)
-    yield from _spread("reported yaw off the true one", turning)
-
-
-def _between(one: Place, other: Place, time: float) -> Place:
-    share = (time - one.time) / max(other.time - one.time, 1e-6)
-
-    def at(name: str) -> float:
-        before = float(getattr(one, name))
-        return before + share * (float(getattr(other, name)) - before)
-
-    return Place(time, 0.0, 0.0, at("yaw"), at("speed"))
 
 
 def _motion(trace: Trace, mark: str) -> Named:

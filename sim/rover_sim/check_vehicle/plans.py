@@ -29,7 +29,7 @@ class Wrong(Exception):
 
 
 async def check(
-    observer: Observer, kind: int, around: tuple[int, int], first: int, *, may_write: bool
+    observer: Observer, kind: int, around: tuple[int, int], first: int, may_write: bool
 ) -> str:
     """Download a plan; with leave, upload another one, compare, clear and restore. Raise Wrong.
 

@@ -94,7 +94,7 @@ def test_by_default_it_neither_arms_nor_changes_what_is_stored() -> None:
         found, asked = run(make)
         assert [name for name, right in found.items() if right is not True] == ["arm and disarm"]
         commands = {each.command for each in asked if isinstance(each, m.CommandLong)}
-        assert commands == {REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, 510, 176, 31_999}
+        assert commands == {REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, 176, 31_999}
         stored = (m.MissionCount, m.MissionItemInt, m.MissionClearAll)
         assert not any(isinstance(each, stored) for each in asked)
         setpoints = [each for each in asked if isinstance(each, m.SetPositionTargetLocalNed)]
@@ -147,7 +147,8 @@ def a_parameter_missing(message: Message) -> list[Message]:
 FAULTS = {
     "silence instead of a refusal": Fault(
         "answers",
-        "PROTOCOL_VERSION on request; AVAILABLE_MODES; an unknown message; an unknown command",
+        "PROTOCOL_VERSION on request; AVAILABLE_MODES; an unknown message; an unknown command; "
+        "interval of an unknown message",
         says=no_refusals,
     ),
     "acks twice": Fault("answers", "acknowledgement", says=twice),
@@ -155,7 +156,7 @@ FAULTS = {
         "answers", "a command for another system", hears=takes_commands_of_others
     ),
     "degrees for radians": Fault(
-        "telemetry", "ATTITUDE; one heading", says=with_fields(m.Attitude, yaw=math.degrees)
+        "telemetry", "ATTITUDE yaw; one heading", says=with_fields(m.Attitude, yaw=math.degrees)
     ),
     "a parameter that never comes": Fault("parameters", "list", says=a_parameter_missing),
     "a mode that is not shown": Fault(
