@@ -9,18 +9,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as mav
 
-from rover_sim.check_vehicle.manoeuvres import (
-    ARMED,
-    DISARMED_AGAIN,
-    DRIVEN,
-    READYING,
-    SILENCE,
-    STANDING_ARMED,
-    STANDING_DISARMED,
-    STEPS,
-    Span,
-    Trace,
-)
+from rover_sim.check_vehicle.manoeuvres import ARMED, ASKED, READYING, Span, Trace
 from rover_sim.observing.driver import ARMED as ARMED_FLAG
 from rover_sim.observing.track import Place, way
 
@@ -57,8 +46,8 @@ def figures_of(trace: Trace) -> dict[tuple[str, str], Value]:
     """Return every figure by group and name: of the manoeuvres by their marks."""
     groups: dict[str, Named] = {
         "Start": _start(trace),
-        "Standing disarmed": _standing(trace, STANDING_DISARMED),
-        "Standing armed": _standing(trace, STANDING_ARMED),
+        "Standing disarmed": _standing(trace, "standing disarmed"),
+        "Standing armed": _standing(trace, "standing armed"),
         "Origin and home": _home(trace),
         **{mark: _motion(trace, mark) for _, mark in trace.marks[:-1]},
     }
@@ -163,7 +152,7 @@ def _standing(trace: Trace, mark: str) -> Named:
     yield "truly turned", abs(_turned(poses))
     states = trace.messages("EXTENDED_SYS_STATE", span)
     yield "landed_state", states[-1].message.landed_state if states else None
-    if mark == STANDING_ARMED:
+    if mark == "standing armed":
         zeros = trace.poses(Span(trace.span(READYING).begin, span.end))
         yield "turned by the first streamed zeros", abs(_turned(zeros))
 
@@ -174,7 +163,8 @@ def _motion(trace: Trace, mark: str) -> Named:
     poses = trace.poses(span)
     if len(poses) < 2:
         return
-    start = trace.silent_since if mark == SILENCE else span.begin
+    is_silent = mark.startswith("set-points end")
+    start = trace.set_points_ended if is_silent else span.begin
     first, late = poses[0], poses[int(len(poses) * STEADY_FROM) :]
     # PX4 follows a velocity over ground: its speed along the first heading
     along = [
@@ -194,7 +184,7 @@ def _motion(trace: Trace, mark: str) -> Named:
     yield "stands within", within
     slower = (pose.time - start for pose in poses if pose.speed < 0.9 * first.speed)
     yield "slower by a tenth after", next(slower, None)
-    if mark in STEPS and (asked := STEPS[mark].speed):
+    if asked := ASKED.get(mark):
         rises = zip(poses, along, strict=True)
         risen = (pose.time - start for pose, speed in rises if speed / asked >= RISEN)
         yield "reaches 63 % of what was asked", next(risen, None)
@@ -220,8 +210,8 @@ def _home(trace: Trace) -> Named:
         is_moved = any(span.begin <= at <= span.end for at in moves for span in spans)
         return "yes" if is_moved else "no"
 
-    yield "home moves when disarmed", within(trace.span(DISARMED_AGAIN))
-    yield "home moves while driving", within(trace.span(DRIVEN))
+    yield "home moves when disarmed", within(trace.span("home: disarmed again"))
+    yield "home moves while driving", within(trace.span("home: driven"))
     armed = [at for at, name in trace.marks if name == READYING][1:]
     yield "home moves when armed", within(*(Span(at, at + ARMS_WITHIN) for at in armed))
 
