@@ -13,22 +13,19 @@ from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from rover_sim.body import Pose
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
-from rover_sim.observing.track import Place, Track
+from rover_sim.observing.virtual import ROVER, VirtualGround
 from rover_sim.personas import PERSONAS
 from rover_sim.realism import Gps
 from rover_sim.testing.task_server import TaskServer
-from rover_sim.testing.virtual_loop import VirtualLoop
 from rover_sim.trial.session import Ground
 from rover_sim.vehicle import make_vehicle
-from rover_sim.virtual import RoverParty, VirtualWorld
+from rover_sim.virtual import VirtualWorld
 
 T = TypeVar("T")
 
 SEED = 1
-ROVER = "rover1"
 SLIP = 0.3  # of the kinematic body, as in the pytest plugin
 NEUTRAL = 1500  # µs
-MOST_VIRTUAL, MOST_REAL = 7200.0, 300.0  # s, of one trial
 SIGTERM_WITHIN = 5.0  # s
 LOOK = 0.05  # s
 
@@ -84,8 +81,7 @@ class TrialGround(Ground):
     def __init__(self, make: Make, *, seed: int = SEED) -> None:
         persona = PERSONAS[make.persona].on(make.frame)
         realism = replace(persona.realism, estimator=persona.estimators[make.gps])
-        net, numbers, truth = MemoryNet(seed=seed), count(), Track()
-        world = self._world = VirtualWorld(net)
+        numbers = count()
         body = kinematic_body(make.frame, start=Pose(), slip=SLIP, seed=seed)
         vehicle = self.vehicle = make_vehicle(
             body, system_id=1, now=0.0, persona=persona, realism=realism, seed=seed
@@ -93,29 +89,21 @@ class TrialGround(Ground):
         for name, value in make.parameters:
             vehicle.autopilot.parameters[name] = value
 
-        def note(now: float) -> None:
-            if not len(truth) or now >= truth.last.time + LOOK / 2:
-                state = vehicle.truth
-                truth.add(Place(now, state.north, state.east, state.yaw))
-
-        world.join(RoverParty(vehicle, net.link(ROVER)))
-        world.watch(note)
+        self._virtual = VirtualGround(vehicle, MemoryNet(seed=seed))
+        net = self._virtual.net
         super().__init__(
-            VirtualServer(world),
+            VirtualServer(self._virtual.world),
             lambda: Client(net.link(f"client{next(numbers)}", peers=(CLIENT_LINK,))),
             lambda: net.link(VEHICLE_LINK, peers=(ROVER,)),
-            truth,
+            self._virtual.truth,
         )
 
     def run(self, trial: Coroutine[Any, Any, T]) -> T:
         """Run a trial to its end, in virtual time."""
-        loop = VirtualLoop(self._world)
-        loop.allow(MOST_VIRTUAL, real_seconds=MOST_REAL)
-        with asyncio.Runner(loop_factory=lambda: loop) as runner:
-            return runner.run(trial)
+        return self._virtual.run(trial)
 
     async def reboot(self) -> None:
-        self.vehicle.autopilot.reboot(now=self._world.now)
+        self.vehicle.autopilot.reboot(now=self._virtual.world.now)
 
     can_push_stick = True
 

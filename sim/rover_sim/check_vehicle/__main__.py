@@ -13,7 +13,7 @@ from mav_tasks.links.link_limits import TO_VEHICLES
 from mav_tasks.links.url import parse_url
 from rover_sim.check_vehicle.contract import GROUPS, Check, Options, Seen, check_all
 from rover_sim.check_vehicle.real import Verdict, compare
-from rover_sim.check_vehicle.simulated import ROVERS, RUNS, Make, in_its_world, measure
+from rover_sim.check_vehicle.simulated import ROVERS, Make, in_its_world, measure
 from rover_sim.observing.driver import Interference
 from rover_sim.observing.observer import Observer
 from rover_sim.observing.track import Track
@@ -40,8 +40,6 @@ def main(
         typer.Option(metavar="WORD", help=f"Simulated rovers with this word: {', '.join(ROVERS)}."),
     ] = "",
     brief: Annotated[bool, typer.Option("--brief", help="Only what is wrong.")] = False,
-    seed: Annotated[int, typer.Option(help="Seed of the first simulated run.")] = 0,
-    runs: Annotated[int, typer.Option(min=1, help="Simulated runs, whose medians count.")] = RUNS,
 ) -> None:
     """Check whether a rover behaves as the server and its clients expect.
 
@@ -59,7 +57,7 @@ def main(
             link, options = _opened(url, insecure=insecure or not arm), Options(arm, write)
             bad = asyncio.run(_checked(link, options, groups, brief))
         else:
-            bad = sum(_simulated(*each, only, groups, brief, seed, runs) for each in makes.items())
+            bad = sum(_simulated(*each, only, groups, brief) for each in makes.items())
     except (UsageError, Interference) as error:
         sys.stderr.write(f"check_vehicle: {error}\n")
         raise typer.Exit(2) from None
@@ -100,9 +98,7 @@ def line_of(check: Check, seen: Seen) -> tuple[str, str]:
     return outcome, f"{check.group}: {check.name}: {expected}{seen.words}"
 
 
-def _simulated(
-    name: str, make: Make, only: str, groups: list[str], brief: bool, seed: int, runs: int
-) -> int:
+def _simulated(name: str, make: Make, only: str, groups: list[str], brief: bool) -> int:
     """Check one simulated rover, and print its figures beside the real ones; count what is bad."""
 
     async def run(link: Link, _truth: Track) -> int:
@@ -110,9 +106,9 @@ def _simulated(
         return await _checked(link, EVERYTHING, groups, brief)
 
     _say(f"{name}: simulated, beside {make.real}")
-    bad = in_its_world(make, seed, run) if groups else 0
+    bad = in_its_world(make, 0, run) if groups else 0
     count: Counter[Verdict] = Counter()
-    for each in compare(name, measure(make, seed=seed, runs=runs)):
+    for each in compare(name, measure(make, seed=0)):
         if only.lower() in each.group.lower() or groups == list(GROUPS):
             count[each.verdict] += 1
             if each.verdict is Verdict.DIFFERS or not brief:

@@ -27,8 +27,6 @@ SHOWN_WITHIN = 2.5  # s until a heartbeat shows a mode or arming
 ARMED_WITHIN = 15.0  # s in which a rover may still refuse after its start
 LOSS_LIMIT = 0.01  # of the packets
 REORDERED = 8  # packets that another one overtakes; PX4 1.17 sometimes swaps two
-OUR_TIME = 123_456_789_000  # ns, to be returned unchanged
-FTP_OPEN, FTP_ACK, FTP_NAK = 4, 128, 129
 LIST_QUIET = 1.5  # s without a new parameter end the list
 ROUNDS = 3  # of reading missing ones by index
 UNNUMBERED = 65535  # param_index of a change that nobody asked for
@@ -182,8 +180,8 @@ class Rover:
         await self.observer.command(REQUEST, VERSION)
         await asyncio.sleep(AFTERMATH)
         acks = [
-            (heard.packet.component_id, *_addressee(heard.message))
-            for heard in self.observer.since(mark, "COMMAND_ACK")
+            (each.packet.component_id, each.message.target_system, each.message.target_component)
+            for each in self.observer.since(mark, "COMMAND_ACK")
         ]
         right = acks == [(AUTOPILOT, out.srcSystem, out.srcComponent)]
         return Seen(right, f"(from, to system, to component): {acks}")
@@ -193,39 +191,6 @@ class Rover:
         other = 1 + self.observer.system % 250
         answer = await self.observer.command(REQUEST, VERSION, system=other)
         return Seen(answer.result is None, answer)
-
-    async def modes_list(self) -> Seen:
-        """Ask for the modes one by one."""
-        number, mark = mav.MAVLINK_MSG_ID_AVAILABLE_MODES, len(self.observer.log)
-        answer = await self.observer.command(REQUEST, number, 1)
-        await asyncio.sleep(AFTERMATH)
-        first = self.observer.message("AVAILABLE_MODES")
-        if first is None:
-            return Seen(answer.is_refused, answer)
-        for index in range(2, first.number_modes + 1):
-            await self.observer.command(REQUEST, number, index)
-        await asyncio.sleep(AFTERMATH)
-        listed = [heard.message for heard in self.observer.since(mark, "AVAILABLE_MODES")]
-        modes = {each.custom_mode for each in listed}
-        right = [each.mode_index for each in listed] == list(range(1, first.number_modes + 1))
-        right = right and {self.driver.make.hold, self.driver.make.control} <= modes
-        return Seen(right, f"{len(listed)} modes: {', '.join(f'{each:#x}' for each in modes)}")
-
-    async def time_sync(self) -> Seen:
-        """Ask for its time."""
-        self.observer.send(self.observer.out.timesync_encode(0, OUR_TIME))
-        found = await self.observer.wait("TIMESYNC", PATIENCE, lambda m: m.tc1 != 0)
-        return Seen(found is not None and found.ts1 == OUR_TIME, found or "silence")
-
-    async def file_transfer(self) -> Seen:
-        """Ask for a file that does not exist."""
-        name = b"@PARAM/no_such_file"
-        payload = [1, 0, 0, FTP_OPEN, len(name), *(0,) * 7, *name.ljust(239, b"\0")]
-        out = self.observer.out
-        self.observer.send(out.file_transfer_protocol_encode(0, *self._target, payload))
-        reply = await self.observer.wait("FILE_TRANSFER_PROTOCOL", PATIENCE)
-        code = None if reply is None else reply.payload[3]
-        return Seen(code in (FTP_ACK, FTP_NAK), f"opcode {code}")
 
     # parameters
 
@@ -372,10 +337,6 @@ class Rover:
         old, damaged = sum(not each.is_v2 for each in packets), self.observer.damaged
         words = f"{lost} missing, {damaged} damaged, {old} of MAVLink 1, of {len(packets)}"
         return Seen(max(lost, damaged) <= LOSS_LIMIT * len(packets) and not old, words)
-
-
-def _addressee(message: Any) -> tuple[int, int]:
-    return message.target_system, message.target_component
 
 
 async def check_all(

@@ -1,6 +1,5 @@
 """The simulated rovers beside the real ones, each in a world of its own in virtual time."""
 
-import asyncio
 import math
 import statistics
 from collections import Counter
@@ -17,18 +16,15 @@ from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.observing.driver import Driver
 from rover_sim.observing.observer import Observer
-from rover_sim.observing.track import Place, Track
+from rover_sim.observing.track import Track
+from rover_sim.observing.virtual import ROVER, VirtualGround
 from rover_sim.personas import PERSONAS
 from rover_sim.realism import Gps
-from rover_sim.testing.virtual_loop import VirtualLoop
 from rover_sim.vehicle import make_vehicle
-from rover_sim.virtual import RoverParty, VirtualWorld
 
 T = TypeVar("T")
 
-ROVER, CHECKER = "rover", "checker"
 LOOPBACK = Conditions(delay=0.0001)  # s each way; the real rovers were recorded on one machine
-MOST_VIRTUAL, MOST_REAL = 1200.0, 120.0  # s, of one drive
 RUNS = 5  # a single run could deviate by chance as much as a recording
 
 
@@ -65,20 +61,8 @@ def in_its_world(make: Make, seed: int, run: Callable[[Link, Track], Coroutine[A
     realism = replace(persona.realism, boot=persona.boot, estimator=persona.estimators[make.gps])
     body = kinematic_body(make.frame, start=Pose(yaw=make.heading), slip=0.0, seed=None)
     vehicle = make_vehicle(body, system_id=1, now=0.0, persona=persona, realism=realism, seed=seed)
-    net, track = MemoryNet(conditions=LOOPBACK), Track()
-    world = VirtualWorld(net)
-    world.join(RoverParty(vehicle, net.link(ROVER)))
-
-    def note(_now: float) -> None:
-        s = vehicle.truth
-        track.add(Place(s.time, s.north, s.east, s.yaw, s.forward_speed, s.yaw_rate))
-
-    world.watch(note)
-    loop = VirtualLoop(world)
-    loop.allow(MOST_VIRTUAL, real_seconds=MOST_REAL)
-    link = net.link(CHECKER, peers=(ROVER,))
-    with asyncio.Runner(loop_factory=lambda: loop) as runner:
-        return runner.run(run(link, track))
+    ground = VirtualGround(vehicle, MemoryNet(conditions=LOOPBACK))
+    return ground.run(run(ground.net.link("checker", peers=(ROVER,)), ground.truth))
 
 
 async def drive(link: Link, truth: Track) -> Trace:

@@ -45,16 +45,15 @@ def _drive(screen: Screen, ends: ExitStack, *, body: str) -> int:
     url = database.create_database("fleet")
     screen.say(f"PostgreSQL: {url}")
     rover_port, *ports = free_ports(1 + len(GATEWAYS))
-    rovers = ("--port", str(rover_port), "--body", body, "--count", str(ROVERS))
-    ends.enter_context(module("rover_sim", *rovers, folder=folder))
+    rovers = f"--port {rover_port} --body {body} --count {ROVERS}"
+    ends.enter_context(module("rover_sim", rovers, folder=folder))
     gateways = []
     for name, port in zip(GATEWAYS, ports, strict=True):
-        options = ["serve", "--config", "", "--gateway", name, "--store", url, "--no-push"]
-        options += ["--client", f"udpin:127.0.0.1:{port}", "--set", "rules.on_takeover=resume"]
-        options += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
+        text = f"serve --config= --gateway {name} --no-push --set rules.on_takeover=resume"
+        text += f" --client udpin:127.0.0.1:{port} --vehicle udpout:127.0.0.1:{rover_port} --store"
         # its record of halts must not lie among those of the user's servers
         env = {**os.environ, "XDG_DATA_HOME": str(folder / name)}
-        gateway = ends.enter_context(module("mav_tasks.cli", *options, folder=folder, env=env))
+        gateway = ends.enter_context(module("mav_tasks.cli", text, url, folder=folder, env=env))
         gateway.said(f"as gateway {name}", within=LIMIT)
         gateways.append(gateway)
         # the second begins when the first has all of them, or it might get them instead

@@ -19,7 +19,7 @@ LOOK = 0.1  # s
 #: how a process ends after Ctrl-C, which a terminal sends to all of them
 INTERRUPTED = (130, -signal.SIGINT)
 #: and if SIGTERM comes while it is already ending after Ctrl-C
-ENDED = (0, *INTERRUPTED, -signal.SIGTERM, -signal.SIGKILL)
+ENDED = (0, *INTERRUPTED, -signal.SIGTERM)
 
 
 class DemoError(Exception):
@@ -38,9 +38,8 @@ class Process:
         """Raise DemoError, with its last line, if it has ended by itself."""
         code = self.popen.poll()
         if code is not None and code not in INTERRUPTED:
-            lines = self.log.read_text("utf-8", "replace").split("\n") or ["no output"]
-            last = next((line for line in reversed(lines) if line.strip()), "no output")
-            raise DemoError(f"{self.name} ended early, exit code {code}: {last}")
+            said = self.log.read_text("utf-8", "replace").strip() or "no output"
+            raise DemoError(f"{self.name} ended early, exit code {code}: {said.splitlines()[-1]}")
 
     def said(self, pattern: str, *, within: float) -> re.Match[str]:
         """Return the first match in what it says. Raise DemoError if none comes in time."""
@@ -59,23 +58,27 @@ class Process:
 
 @contextmanager
 def module(
-    name: str, *arguments: str, folder: Path, env: Mapping[str, str] | None = None
+    name: str, text: str, *more: str, folder: Path, env: Mapping[str, str] | None = None
 ) -> Iterator[Process]:
-    """Run a Python module for a ``with`` block; then end it with SIGTERM."""
-    label = " ".join((name, *arguments[:1]))
+    """Run a Python module for a ``with`` block; then end it with SIGTERM.
+
+    ``text``: its arguments, up to those that may have blanks.
+    """
+    label = f"{name} {text.split(maxsplit=1)[0]}"
     log = folder / f"{len(list(folder.glob('*.log')))}.log"
-    command = [sys.executable, "-m", name, *arguments]
+    command = [sys.executable, "-m", name, *text.split(), *more]
     with log.open("wb") as output:
         running = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, env=env)
     try:
         yield Process(label, running, log)
     finally:
+        is_killed = running.poll() == -signal.SIGKILL  # on purpose
         running.terminate()
         with suppress(subprocess.TimeoutExpired):
             running.wait(STOP_LIMIT)
         running.kill()
         running.wait()
-    if running.returncode not in ENDED:
+    if running.returncode not in ENDED and not is_killed:
         raise DemoError(f"{label} ended with {running.returncode}")
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from mav_tasks.links.link_limits import TO_CLIENTS
 from mav_tasks.links.url import parse_url
+from rover_sim.demo.fast import follow
 from rover_sim.demo.processes import LOOK, Process, free_ports, module
 from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import ThirdParty
@@ -33,32 +34,37 @@ def drive(
     """
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mav-tasks-demo-")))
-        truth, store = folder / "truth.csv", str(folder / "demo.sqlite3")
+        truth, store = (
+            str(folder / "truth.csv"),
+            str(folder / "demo.sqlite3") if web else ":memory:",
+        )
+        running: list[Process] = []
+
+        def start(name: str, text: str, *more: str) -> Process:
+            running.append(stack.enter_context(module(name, text, *more, folder=folder)))
+            return running[-1]
+
         rover_port, client_port = free_ports(2)
-        server = f"udpout:127.0.0.1:{client_port}"
-        rover_options = ["--port", str(rover_port), "--body", body, "--truth", str(truth)]
-        rover_options += ["--seed", str(seed), "--friction-variation", "0.3"] if seed else []
-        rover_options += ["--gui"] if gui else []
-        options = ["serve", "--config", "", "--client", f"udpin:127.0.0.1:{client_port}"]
-        options += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
-        options += ["--store", store if web else ":memory:"]
-        options += ["--record", record] if record else []
-        rover = stack.enter_context(module("rover_sim", *rover_options, folder=folder))
-        serving = stack.enter_context(module("mav_tasks.cli", *options, folder=folder))
-        running = [rover, serving]
+        text = f"--port {rover_port} --body {body}" + (" --gui" if gui else "")
+        text += f" --seed {seed} --friction-variation 0.3" if seed else ""
+        rover = start("rover_sim", text, "--truth", truth)
+        text = f"serve --config= --client udpin:127.0.0.1:{client_port}"
+        text += f" --vehicle udpout:127.0.0.1:{rover_port} --store"
+        start("mav_tasks.cli", text, store, *(("--record", record) if record else ()))
         screen.say(f"rover: {body} body on UDP {rover_port}; server on UDP {client_port}")
         screen.say("a QGroundControl on this machine will see the rover")
+        server = f"udpout:127.0.0.1:{client_port}"
         if web:
             keys = folder / "keys.toml"  # none: nobody needs a token, whatever keys the user has
             keys.touch(mode=0o600)
-            options = ["web", "--server", server, "--store", store, "--keys", str(keys)]
-            options += ["--listen", f"127.0.0.1:{PAGE_PORT if _is_free(PAGE_PORT) else 0}"]
-            running.append(stack.enter_context(module("mav_tasks.cli", *options, folder=folder)))
-            url = running[-1].said(r"web page: (\S+)", within=STARTS_WITHIN)[1]
+            port = PAGE_PORT if _is_free(PAGE_PORT) else 0
+            text = f"web --server {server} --listen 127.0.0.1:{port} --store"
+            page = start("mav_tasks.cli", text, store, "--keys", str(keys))
+            url = page.said(r"web page: (\S+)", within=STARTS_WITHIN)[1]
             screen.say(f"web page: {url}")
             _open_browser(url)
         rover.said(" on udp", within=STARTS_WITHIN)
-        found = asyncio.run(_watch(screen, server, truth, running))
+        found = asyncio.run(_watch(screen, server, Path(truth), running))
         if web:
             screen.say("the rover, the server and the page go on: press Ctrl-C to end them")
             with suppress(KeyboardInterrupt):
@@ -74,13 +80,7 @@ async def _watch(
     observer = Observer(parse_url(server).open(limits=TO_CLIENTS))
     with from_file(truth) as track:
         party = ThirdParty(observer, lambda: track.last, screen.say)
-        driving = asyncio.ensure_future(party.run())
-        while not driving.done():
-            _check(running)
-            screen.update(party)
-            await asyncio.sleep(LOOK)
-        await driving
-        screen.update(party)
+        await follow(party, screen, lambda: _check(running))
         observer.close()
         return party, track
 

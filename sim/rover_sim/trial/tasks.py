@@ -1,9 +1,9 @@
 """Row: thirty tasks, one after another, each measured where the rover then stands."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import ceil, cos, degrees, hypot, pi, radians, remainder, sin, tau
+from math import ceil, cos, degrees, hypot, radians, remainder, sin, tau
 from statistics import fmean
 
 from mav_tasks.client.wire import Goal
@@ -14,10 +14,6 @@ from rover_sim.trial.session import End, Result, Session
 WITHIN = 300.0  # s for one task, at 0.5 m/s: 45 m to a mission of 30 m, and curves
 MOST_SHOWN = 4  # failures shown
 UNABLE = ("not turn", "not reverse", "cannot turn")  # in refusals of impossible tasks
-FAR = 30.0  # m, the longest go-to
-BENDS = (0.0, pi / 4, pi / 2, 3 * pi / 4, pi)  # of a mission on an arc that a car can drive
-LEG = 6.0  # m
-
 Point = tuple[float, float]  # north and east, m
 
 
@@ -32,66 +28,42 @@ class TrialTask:
     is_relative: bool = False  # to the rover's place at its start, as for a move
 
 
-#: makes a task from the reported place now and that at the start of the trial
-Maker = Callable[[Place, Place], TrialTask]
+#: further ones replace those that the rover cannot drive. m and degrees; places are ahead and to
+#: the right of where the trial began, or of where it is now (near); the mission bends as a car can
+TASKS = (
+    "move 0.3, move 0.5, turn 90, move 1, turn -90, move 2, move -1, turn 45, move 0.3, turn -45, "
+    "move 3, turn 180, move 3, turn 120, turn 60, near 3 0, go 30 0, go 20 8, move 0.5, turn -120, "
+    "move -1, go 0 0, move 10, turn 30, move 1, move 5, "
+    "mission 10 0 14.2 4.2 14.2 10.2 10 14.5 4 14.5, move 0.3, move 2, return"
+)
+FURTHER = (
+    "near 3 0, move 0.3, move 0.5, move 1, go 10 4, move 2, near 3 0, move 0.3, go 18 -4, move 1, "
+    "move 0.5, move 0.3, go 2 0"
+)
 
 
-def _offset(place: Place, forward: float, right: float = 0.0) -> Point:
-    north = place.north + forward * cos(place.yaw) - right * sin(place.yaw)
-    return north, place.east + forward * sin(place.yaw) + right * cos(place.yaw)
-
-
-def move(distance: float) -> Maker:
-    """Return a maker of a move along the heading."""
-    words, goals = f"move {distance:g} m", (Move(distance),)
-    return lambda now, _: TrialTask(words, goals, _offset(now, distance), is_relative=True)
-
-
-def turn(angle: float) -> Maker:
-    """Return a maker of a turn on the spot, deg."""
-    by = radians(angle)
-    return lambda _now, _begun: TrialTask(f"turn {angle:g} deg", (Rotate(by),), turn=by)
-
-
-def go(forward: float, right: float) -> Maker:
-    """Return a maker of a go-to, relative to the trial's start pose."""
-    return lambda _, begun: _to(f"go to {forward:g}, {right:g} m", _offset(begun, forward, right))
-
-
-def near(_now: Place, _begun: Place) -> TrialTask:
-    """Return a go-to 3 m ahead of the rover."""
-    return _to("go 3 m ahead", _offset(_now, 3.0))
-
-
-def mission(_now: Place, begun: Place) -> TrialTask:
-    """Return a mission of five places on an arc."""
-    forward, right, places = 4.0, 0.0, []
-    for bend in BENDS:
-        forward, right = forward + LEG * cos(bend), right + LEG * sin(bend)
-        places.append(_offset(begun, forward, right))
-    return _to("mission of 5", *places)
-
-
-def home(_now: Place, _begun: Place) -> TrialTask:
-    """Return a go-to home, the place that the rover says, which the trial does not know."""
-    return TrialTask("return", (GoTo(None),))
-
-
-def _to(words: str, *places: Point) -> TrialTask:
+def task_of(words: str, now: Place, begun: Place) -> TrialTask:
+    """Return a task from the reported place now and that at the start of the trial."""
+    kind, *numbers = words.split()
+    values = [float(number) for number in numbers]
+    match kind:
+        case "move":
+            goal = Move(values[0])
+            return TrialTask(words, (goal,), _offset(now, values[0], 0.0), is_relative=True)
+        case "turn":
+            angle = radians(values[0])
+            return TrialTask(words, (Rotate(angle),), turn=angle)
+        case "return":  # to a place that the trial does not know
+            return TrialTask(words, (GoTo(None),))
+    base = now if kind == "near" else begun
+    pairs = zip(values[::2], values[1::2], strict=True)
+    places = [_offset(base, forward, right) for forward, right in pairs]
     return TrialTask(words, tuple(GoTo(LocalPlace(*place)) for place in places), places[-1])
 
 
-#: further ones replace those that the rover cannot drive
-TASKS: Sequence[Maker] = (
-    *(move(0.3), move(0.5), turn(90), move(1.0), turn(-90), move(2.0), move(-1.0), turn(45)),
-    *(move(0.3), turn(-45), move(3.0), turn(180), move(3.0), turn(120), turn(60), near),
-    *(go(FAR, 0.0), go(20.0, 8.0), move(0.5), turn(-120), move(-1.0), go(0.0, 0.0), move(10.0)),
-    *(turn(30), move(1.0), move(5.0), mission, move(0.3), move(2.0), home),
-)
-FURTHER: Sequence[Maker] = (
-    *(near, move(0.3), move(0.5), move(1.0), go(10.0, 4.0), move(2.0), near),
-    *(move(0.3), go(18.0, -4.0), move(1.0), move(0.5), move(0.3), go(2.0, 0.0)),
-)
+def _offset(place: Place, forward: float, right: float) -> Point:
+    north = place.north + forward * cos(place.yaw) - right * sin(place.yaw)
+    return north, place.east + forward * sin(place.yaw) + right * cos(place.yaw)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,17 +127,17 @@ async def drive_tasks(session: Session) -> Result:
     true = await session.rest()
     begun = session.told.last
     tally.add_shift(true, begun)
-    makers, instead = list(TASKS), FURTHER
-    while makers:
-        await _drive_one(session, makers.pop(0), begun, tally)
-        if len(makers) == 1:  # before the way home
-            makers[:0], instead = instead[: tally.refused], ()
+    left, instead = TASKS.split(", "), FURTHER.split(", ")
+    while left:
+        await _drive_one(session, left.pop(0), begun, tally)
+        if len(left) == 1:  # before the way home
+            left[:0], instead = instead[: tally.refused], []
     return _result(session, tally)
 
 
-async def _drive_one(session: Session, maker: Maker, begun: Place, tally: Tally) -> None:
+async def _drive_one(session: Session, words: str, begun: Place, tally: Tally) -> None:
     before, told = session.track.last, session.told.last
-    asked = maker(told, begun)
+    asked = task_of(words, told, begun)
     end = await session.drive(asked.goals, within=WITHIN)
     if end.state == "REFUSED" and any(word in end.words for word in UNABLE):
         session.say(f"  {asked.words}: refused: {end.words}")

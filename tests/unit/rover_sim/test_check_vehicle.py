@@ -147,8 +147,8 @@ def a_parameter_missing(message: Message) -> list[Message]:
 FAULTS = {
     "silence instead of a refusal": Fault(
         "answers",
-        "PROTOCOL_VERSION on request; AVAILABLE_MODES; an unknown message; an unknown command; "
-        "interval of an unknown message",
+        "PROTOCOL_VERSION on request; AVAILABLE_MODES on request; an unknown message; "
+        "an unknown command; interval of an unknown message",
         says=no_refusals,
     ),
     "acks twice": Fault("answers", "acknowledgement", says=twice),
