@@ -24,8 +24,7 @@ FIRST_HEARTBEAT = 1.0
 RETRY = 3.0  # s between two attempts to arm
 STILL, STILL_FOR = 0.15, 5.0  # m/s reported, s; then a rover stands
 ARMED, READYING = "armed for the first time", "arming and taking control"
-FAST = {True: 50.0, False: 40.0}  # Hz, by whether it is a PX4; 40 is ArduPilot's maximum
-SLOW = 5.0  # Hz
+FAST, SLOW = 20.0, 5.0  # Hz
 ASK_PLACES, ASK_RATES = 2.0, 10  # s between requests of home; requests of rates after so many
 FAST_IDS = (mav.MAVLINK_MSG_ID_ATTITUDE, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
 SLOW_IDS = (mav.MAVLINK_MSG_ID_SYS_STATUS, mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
@@ -111,7 +110,7 @@ class Drive:
         driver, turn = self.driver, 0
         while True:
             if turn % ASK_RATES == 0:
-                await driver.ask_rates(FAST[driver.make.by_course], *FAST_IDS)
+                await driver.ask_rates(FAST, *FAST_IDS)
                 await driver.ask_rates(SLOW, *SLOW_IDS)
             for number in PLACES:
                 await driver.observer.command(mav.MAV_CMD_REQUEST_MESSAGE, number)
