@@ -127,9 +127,12 @@ async def trial(
         insecure=insecure,
         keep=keep,
     )
-    await _run(options, written)
-    out.say("\n".join(table(written.rows)))
-    out.say(f"report: {report}")
+    try:
+        await _run(options, written)
+    finally:
+        if written.rows:
+            out.say("\n".join(table(written.rows)))
+            out.say(f"report: {report}")
     if written.has_failed:
         raise typer.Exit(FAILED)
 
@@ -148,10 +151,12 @@ def _confirm(rows: list[str]) -> None:
 
 
 async def _run(options: Options, report: Report) -> None:
-    """Run the trial; end it in order on a signal, with exit status 130."""
-    running = asyncio.ensure_future(run_trial(options, report, say=out.say))
+    """Run the trial; the first signal ends it in order, with exit status 130."""
+    running = asyncio.create_task(run_trial(options, report, say=out.say))
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        asyncio.get_running_loop().add_signal_handler(number, running.cancel)
+        asyncio.get_running_loop().add_signal_handler(
+            number, lambda: running.cancelling() or running.cancel()
+        )
     try:
         await running
     except TrialError as error:

@@ -22,6 +22,7 @@ from rover_sim.observing.driver import CUSTOM_MODE, Driver, Interference
 from rover_sim.observing.observer import AUTOPILOT, PATIENCE, Observer
 
 FIRST_HEARD = 10.0  # s to wait for a rover
+LISTENED = 3.0  # s
 AFTERMATH = 0.2  # s in which a duplicate answer would come
 SHOWN_WITHIN = 2.5  # s until a heartbeat shows a mode or arming
 ARMED_WITHIN = 15.0  # s in which a rover may still refuse after its start
@@ -137,16 +138,19 @@ class Rover:
         off = abs(math.remainder(yaw - heading, 360.0))
         return Seen(off <= 10.0, f"{yaw:.1f}° and {heading:.1f}°")
 
-    async def boot_times(self) -> Seen:
-        """Compare time_boot_ms with our clock."""
-        mark = len(self.observer.log)
-        await self.driver.ask_rates(5.0, mav.MAVLINK_MSG_ID_ATTITUDE)
-        await asyncio.sleep(2.0)
-        await self.driver.ask_rates(0.0, mav.MAVLINK_MSG_ID_ATTITUDE)
+    async def streams(self, hertz: str) -> Seen:
+        """Ask for ATTITUDE at a rate; compare its time_boot_ms with our clock."""
+        mark, rate = len(self.observer.log), float(hertz)
+        await self.driver.ask_rates(rate, mav.MAVLINK_MSG_ID_ATTITUDE)
+        await asyncio.sleep(LISTENED)
         rows = self.observer.since(mark, "ATTITUDE")
-        times = [each.message.time_boot_ms for each in rows]
-        pace = (times[-1] - times[0]) / (rows[-1].at - rows[0].at) if len(rows) > 1 else 0.0
-        return Seen(times == sorted(times) and 700 < pace < 1300, f"{pace:.0f} a second")
+        await self.driver.ask_rates(0.0, mav.MAVLINK_MSG_ID_ATTITUDE)
+        if len(rows) < 2:
+            return Seen(False, f"{len(rows)} in {LISTENED:g} s")
+        times, seconds = [each.message.time_boot_ms for each in rows], rows[-1].at - rows[0].at
+        seen, pace = (len(rows) - 1) / seconds, (times[-1] - times[0]) / seconds
+        right = 0.7 < seen / rate < 1.3 and 700 < pace < 1300 and times == sorted(times)
+        return Seen(right, f"{seen:.1f} Hz, {pace:.0f} ms of its clock a second")
 
     # answers
 

@@ -17,7 +17,7 @@ PERIOD = 0.05  # s between setpoints, 20 Hz
 VELOCITY, VELOCITY_AND_RATE = 0x0DC7, 0x05C7  # type_mask
 CUSTOM_MODE, ARMED = 1, 128  # MAV_MODE_FLAG
 FRESH_BEAT, FRESH_PLACE = 2.5, 1.0  # s
-TRIES = 8  # of bringing the rover to rest
+TRIES = 5  # of bringing the rover to rest
 PRESS_ON = 1e-3  # m/s: a PX4 takes plain zeros for a course to the north
 
 

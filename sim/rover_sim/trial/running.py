@@ -80,10 +80,16 @@ async def run_trial(options: Options, report: Report, *, say: Callable[[str], No
 
         def done(row: Row) -> None:
             report.rows.append(row)
-            say(f"{row.kind.name}: {row.verdict.value}: {row.result.words} {row.result.figure}")
-            report.write(session.track, is_true=truth is not None)
+            say(f"{row.kind.title}: {row.verdict.value}: {row.result.words} {row.result.figure}")
 
-        await run_rows(session, options.only, done=done)
+        try:
+            await run_rows(session, options.only, done=done)
+        except BaseException as error:
+            report.ended = str(error) or "interrupted"
+            raise
+        finally:
+            if report.rows:
+                report.write(session.track, is_true=truth is not None)
 
 
 def _truth(options: Options, stack: AsyncExitStack) -> tuple[Track | None, Observer | None]:
