@@ -283,14 +283,15 @@ class Rover:
         if driver.is_armed:
             return Seen(None, "it is armed: changing its mode could move it")
         before, mode = driver.mode, getattr(driver.make, name)
-        if driver.make.in_parts and name == "control":
-            await driver.zeros(1.0)
-        answer = await driver.set_mode(mode)
-        shown = await self.observer.until(lambda: driver.mode == mode, SHOWN_WITHIN)
-        seen = Seen(answer.is_accepted and shown, f"{answer}, mode {driver.mode:#x}")
-        await driver.set_mode(before)
-        await self.observer.until(lambda: driver.mode == before, SHOWN_WITHIN)
-        return seen
+        try:
+            if driver.make.in_parts and name == "control":
+                await driver.zeros(1.0)
+            answer = await driver.set_mode(mode)
+            shown = await self.observer.until(lambda: driver.mode == mode, SHOWN_WITHIN)
+            return Seen(answer.is_accepted and shown, f"{answer}, mode {driver.mode:#x}")
+        finally:
+            await driver.set_mode(before)
+            await self.observer.until(lambda: driver.mode == before, SHOWN_WITHIN)
 
     async def nonsense(self) -> Seen:
         """Ask for a mode that does not exist."""
@@ -318,18 +319,20 @@ class Rover:
         if not self.options.arm or driver.is_armed:
             return Seen(None, "needs --arm, and a rover that is disarmed")
         await driver.hold()
-        end, answer = self.observer.now + ARMED_WITHIN, await driver.arm()
-        while not answer.is_accepted and self.observer.now < end:
-            await asyncio.sleep(1.0)
-            answer = await driver.arm()
 
         def shown() -> bool:
             state = self.observer.message("EXTENDED_SYS_STATE")
             flies = state is not None and state.landed_state == IN_AIR
             return driver.is_armed and (flies or not self._make.is_px4)
 
-        armed = await self.observer.until(shown, SHOWN_WITHIN)
-        rested = await driver.rest()
+        try:
+            end, answer = self.observer.now + ARMED_WITHIN, await driver.arm()
+            while not answer.is_accepted and self.observer.now < end:
+                await asyncio.sleep(1.0)
+                answer = await driver.arm()
+            armed = await self.observer.until(shown, SHOWN_WITHIN)
+        finally:
+            rested = await driver.rest()
         words = f"{answer}, {'' if armed else 'not '}shown, {'' if rested else 'not '}at rest again"
         return Seen(answer.is_accepted and armed and rested, words)
 
