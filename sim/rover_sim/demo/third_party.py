@@ -98,10 +98,11 @@ class ThirdParty:
         end = self.observer.now + PATIENCE
         await self.observer.until(lambda: self._positions >= POSITIONS, PATIENCE)
         await self._command(SET_MESSAGE_INTERVAL, TASK_STATUS, PROGRESS_INTERVAL_US)
+        first = self.tasks[0]
         for task in self.tasks:
             await self._submit(task)
-            # the first one must start at once, so that later ones wait
-            await self.observer.until(lambda: self.tasks[0].state >= STARTING, PATIENCE)
+            if first.is_accepted:  # it must start at once, so that later ones wait
+                await self.observer.until(lambda: first.state >= STARTING, PATIENCE)
         while not self.is_over and self.observer.now < end:
             for task in self.tasks:
                 if task.state < EXECUTING:
