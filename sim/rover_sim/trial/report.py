@@ -1,5 +1,6 @@
 """The report of a trial: a page of Markdown, and a picture of the tracks."""
 
+import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -38,8 +39,8 @@ class Report:
         for path in (self.path, self.picture):
             if path.exists() and not may_replace:
                 raise UsageError(f"{path} exists: name another one with --report, or add --force")
-        if not self.path.parent.is_dir():
-            raise UsageError(f"--report {self.path}: there is no folder {self.path.parent}")
+        if not os.access(self.path.parent, os.W_OK):
+            raise UsageError(f"--report {self.path}: nothing can be written to {self.path.parent}")
 
     @property
     def picture(self) -> Path:
@@ -54,10 +55,9 @@ class Report:
     def write(self, track: Track, *, is_true: bool) -> None:
         """Write page and picture."""
         source = "true poses" if is_true else "the rover's own estimate"
-        tracks = self._tracks(track)
-        picture = why_no_picture()
-        if tracks and not picture:
-            draw(tracks, self.picture)
+        tracks, picture = self._tracks(track), why_no_picture()
+        is_drawn = bool(tracks) and not picture
+        if is_drawn:
             picture = f"![tracks]({self.picture.name})\n\nBy {source}; north is up."
         count = {each: sum(row.verdict is each for row in self.rows) for each in Verdict}
         lines = [
@@ -77,6 +77,8 @@ class Report:
             picture if tracks else "No track: the rover did not move.",
         ]
         self.path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        if is_drawn:
+            draw(tracks, self.picture)
 
     def _tracks(self, track: Track) -> Mapping[str, Sequence[Place]]:
         tracks: dict[str, Sequence[Place]] = {}
