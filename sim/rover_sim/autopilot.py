@@ -32,12 +32,11 @@ from rover_sim.personas import Mode, Persona
 from rover_sim.realism import Realism
 from rover_sim.setpoints import Destination
 from rover_sim.sticks import Sticks
-from rover_sim.streams import Streams, with_sticks
+from rover_sim.streams import Streams
 from rover_sim.telemetry import Telemetry
 from rover_sim.timing import Departures
 
 MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # clients steer by these
-UNASKED_STICKS = 1.0  # s, interval of RC_CHANNELS until a client sets another
 RUNTIME_INTERVAL = 30.0  # s, AP_Stats' flush_interval_ms
 POSITIONS = (messages.LocalPositionNed.id, messages.GlobalPositionInt.id)
 FASTEST = 5.0  # m/s, the speed limit if the parameter sets none
@@ -76,11 +75,7 @@ class Autopilot:
         self._origin = origin
         self._unix_offset = unix_offset
         self._outbox = Outbox()
-        listed = persona.parameters
-        self._runtime = persona.runtime_parameter
-        if self._runtime is not None:
-            listed += (self._runtime,)
-        self._parameters = Parameters(listed, persona.parameter_protocol, self._outbox)
+        self._parameters = Parameters(persona.parameters, self._outbox, bytewise=persona.bytewise)
         self._parameters[persona.system_id_parameter] = system_id
         self._missions = MissionStorage(
             conventions=persona.missions, origin=origin, outbox=self._outbox
@@ -219,7 +214,7 @@ class Autopilot:
         self._up_at = up_at
         self._gps = GpsLoss()
         self._runtime_due = up_at + RUNTIME_INTERVAL
-        self._streams = Streams(with_sticks(persona.streams, UNASKED_STICKS), now=up_at)
+        self._streams = Streams(persona.streams, now=up_at)
         boot = Boot(realism.boot, persona.boot_script, started=up_at)
         self._motion = persona.drive(persona.frame, self._parameters)
         rules = persona.rules(
@@ -312,11 +307,10 @@ class Autopilot:
 
     def _count_runtime(self, now: float) -> None:
         """Count the runtime parameter up; ArduPilot sends it unasked."""
-        if self._runtime is not None and now >= self._runtime_due:
+        name = self._persona.runtime_parameter
+        if name is not None and now >= self._runtime_due:
             self._runtime_due += RUNTIME_INTERVAL
-            self._parameters.change(
-                self._runtime.name, self._parameters[self._runtime.name] + RUNTIME_INTERVAL
-            )
+            self._parameters.change(name, self._parameters[name] + RUNTIME_INTERVAL)
 
     def _go_to_item(self, place: Destination, now: float) -> bool:
         flight = self._flight

@@ -5,33 +5,22 @@ AVAILABLE_MODES_MONITOR: PX4 sends that only after a first change, and never on 
 """
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from mav_tasks.mavlink import messages as m
 from rover_sim.modes import Mode, ModeNumbers
 
 NON_STANDARD, SAFE_RECOVERY, MISSION = 0, 5, 6  # MAV_STANDARD_MODE
-ADVANCED = 1  # MAV_MODE_PROPERTY
 
 
-class OfferedMode(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class OfferedMode:
     """One mode as a client displays it."""
 
     mode: Mode
     standard: int  # MAV_STANDARD_MODE
     name: str  # empty for a standard mode: the client names it
     properties: int  # MAV_MODE_PROPERTY
-
-
-#: in the order of PX4's navigation states; PX4 marks all but POSITION as advanced
-PX4_OFFERED = (
-    OfferedMode(Mode.MANUAL, NON_STANDARD, "Manual", ADVANCED),
-    OfferedMode(Mode.POSITION, NON_STANDARD, "Position", 0),
-    OfferedMode(Mode.AUTO, MISSION, "", ADVANCED),
-    OfferedMode(Mode.HOLD, NON_STANDARD, "Hold", ADVANCED),
-    OfferedMode(Mode.RTL, SAFE_RECOVERY, "", ADVANCED),
-    OfferedMode(Mode.GUIDED, NON_STANDARD, "Offboard", ADVANCED),
-)
 
 
 def available_modes(

@@ -4,18 +4,8 @@
 """
 
 from dataclasses import dataclass
-from enum import Enum
 
-from mav_tasks.mavlink.enums import MavSeverity
 from rover_sim.realism import BootTimes
-
-
-class Event(Enum):
-    """The event that triggers a boot text; the value names the field of ``BootTimes``."""
-
-    READY = "mode_lost"
-    ORIGIN = "origin"
-    USES_GPS = "uses_gps"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,41 +13,8 @@ class BootScript:
     """Texts and mode behaviour of one make during its boot."""
 
     refusals: tuple[tuple[float, tuple[str, ...]], ...]  # (end as a part of ``armable``, texts)
-    texts: tuple[tuple[Event, MavSeverity, str], ...]
+    texts: tuple[tuple[str, str], ...]  # (the field of BootTimes after which it is said, text)
     keeps_to_its_first_mode: bool  # ArduPilot: a mode that is entered early is lost
-
-
-ARDUPILOT_SCRIPT = BootScript(
-    # recorded: the first at 1.1 s, the second from 4.1 to 13.1 s, the third from 16.1 to 22.2 s
-    refusals=(
-        (0.095, ("Arm: System not initialised",)),
-        (0.63, ("Arm: Accels inconsistent",)),
-        (1.0, ("Arm: Gyros inconsistent",)),
-    ),
-    texts=(
-        (Event.READY, MavSeverity.INFO, "ArduPilot Ready"),
-        (Event.READY, MavSeverity.INFO, "AHRS: DCM active"),
-        (Event.ORIGIN, MavSeverity.INFO, "EKF3 IMU0 origin set"),
-        (Event.ORIGIN, MavSeverity.INFO, "EKF3 IMU1 origin set"),
-        (Event.USES_GPS, MavSeverity.INFO, "EKF3 IMU0 is using GPS"),
-        (Event.USES_GPS, MavSeverity.INFO, "EKF3 IMU1 is using GPS"),
-        (Event.USES_GPS, MavSeverity.INFO, "AHRS: EKF3 active"),
-    ),
-    keeps_to_its_first_mode=True,
-)
-PX4_SCRIPT = BootScript(
-    refusals=(
-        (
-            1.0,
-            (
-                "Preflight Fail: system power unavailable",
-                "Arming denied: Resolve system health failures first",
-            ),
-        ),
-    ),
-    texts=(),
-    keeps_to_its_first_mode=False,
-)
 
 
 class Boot:
@@ -119,11 +76,11 @@ class Boot:
             return ()
         return next(texts for end, texts in self._script.refusals if part < end)
 
-    def texts_due(self, *, now: float) -> list[tuple[MavSeverity, str]]:
+    def texts_due(self, *, now: float) -> list[str]:
         """Return the texts that became due since the last call."""
         if not self._unsaid:
             return []
         at = now - self._started
-        due = [each for each in self._unsaid if at >= getattr(self._times, each[0].value)]
+        due = [each for each in self._unsaid if at >= getattr(self._times, each[0])]
         self._unsaid = tuple(each for each in self._unsaid if each not in due)
-        return [(severity, text) for _, severity, text in due]
+        return [text for _, text in due]

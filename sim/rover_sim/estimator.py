@@ -42,6 +42,12 @@ def wandering(wander: Wander, chance: Random) -> Iterator[float]:
         yield fixed + error
 
 
+def in_radians(error: Wander) -> Wander:
+    """Return an error in radians that is given in degrees."""
+    spread, least, most = map(math.radians, (error.spread, error.least, error.most))
+    return Wander(spread, error.time, least, most)
+
+
 class Estimator:
     """Sees the truth with errors. The same seed gives the same errors, step for step."""
 
@@ -51,8 +57,8 @@ class Estimator:
         self._right = wandering(error.lateral_speed, chance)
         self._north = wandering(error.position, chance)
         self._east = wandering(error.position, chance)
-        self._yaw = wandering(error.yaw, chance)
-        self._yaw_rate = wandering(error.yaw_rate, chance)
+        self._yaw = wandering(in_radians(error.yaw), chance)
+        self._yaw_rate = wandering(in_radians(error.yaw_rate), chance)
         drift = error.drift
         self._drift_north, self._drift_east = (
             repeat(0.0) if drift is None else wandering(drift, chance) for _ in range(2)
@@ -104,7 +110,7 @@ class Upset:
     def __init__(self, error: PushingError, chance: Random) -> None:
         self._forward = wandering(error.speed, chance)
         self._right = wandering(error.speed, chance)
-        self._yaw = wandering(error.yaw, chance)
+        self._yaw = wandering(in_radians(error.yaw), chance)
         self._pushed = 0.0  # s of uninterrupted pushing
         self._left = 0.0  # s until it recovers
         self._share = 0.0  # 0 (normal) to 1 (fully upset)

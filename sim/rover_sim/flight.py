@@ -265,8 +265,8 @@ class FlightControl:
 
     def _pass_time(self, now: float) -> None:
         self._rules.sticks_present = self._rules.sticks_present or self._radio.is_there
-        for severity, text in self._boot.texts_due(now=now):
-            self._outbox.say(severity, text)
+        for text in self._boot.texts_due(now=now):
+            self._outbox.inform(text)
         started = self.mode is Mode.INITIALISING and self._boot.is_initialised(now=now)
         if self._boot.loses_mode(now=now) or started:
             self.enter(Mode.MANUAL)

@@ -26,10 +26,6 @@ class HomeRule:
     is_told: bool  # HOME_POSITION is sent when home moves
 
 
-ARDUPILOT_HOME = HomeRule(where_armed=False, least_move=0.5, here_is_kept=True, is_told=True)
-PX4_HOME = HomeRule(where_armed=True, least_move=1.0, here_is_kept=False, is_told=False)
-
-
 class Follower:
     """Moves home after a disarmed rover."""
 

@@ -239,9 +239,9 @@ class MissionStorage:
 
     def _ask(self, upload: _Upload, now: float) -> None:
         upload.asked_at = now
-        self._outbox.send(
-            self._conventions.request(*upload.partner, len(upload.items), upload.mission_type)
-        )
+        is_int = self._conventions.requests_int
+        request = messages.MissionRequestInt if is_int else messages.MissionRequest
+        self._outbox.send(request(*upload.partner, len(upload.items), upload.mission_type))
 
     def _ack_plan(self, partner: Address, mission_type: int) -> None:
         plan_id = self.plan_id(mission_type)

@@ -4,16 +4,13 @@ MAVLink guide, "Message Interval"; REQUEST_DATA_STREAM sets the same intervals b
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-
-from mav_tasks.mavlink import messages as m
+from dataclasses import dataclass
 
 OFF = 0.0
 NEVER = float("inf")
 LONGEST_TOLD = 2**31 - 1  # µs, the limit of MESSAGE_INTERVAL
 JITTER = 1e-6  # s; clock readings are not exact multiples of an interval
 ALL_STREAMS = 0  # MAV_DATA_STREAM
-RC_GROUP = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,79 +20,6 @@ class StreamTable:
     intervals: Mapping[int, float]  # s, by message id; OFF: only on request
     shortest_interval: float  # s; shorter ones are refused
     groups: Mapping[int, tuple[int, ...]]  # what REQUEST_DATA_STREAM sets, by MAV_DATA_STREAM
-
-
-ARDUPILOT_STREAMS = StreamTable(
-    intervals=dict.fromkeys(
-        (
-            m.Heartbeat.id,
-            m.SysStatus.id,
-            # The real one sends these two on request only; with both streamed, MAVSDK and
-            # QGroundControl can connect to the simulator without the server.
-            m.ExtendedSysState.id,
-            m.HomePosition.id,
-            m.Attitude.id,
-            m.LocalPositionNed.id,
-            m.GlobalPositionInt.id,
-            m.GpsRawInt.id,
-            m.VfrHud.id,
-            m.BatteryStatus.id,
-            m.SystemTime.id,
-            m.MissionCurrent.id,
-            m.PositionTargetGlobalInt.id,
-        ),
-        1.0,  # a SITL streams at 1 Hz by default
-    ),
-    shortest_interval=0.02,  # the real one's main loop
-    groups={  # as in Rover
-        1: (),  # RAW_SENSORS
-        2: (  # EXTENDED_STATUS
-            m.SysStatus.id,
-            m.MissionCurrent.id,
-            m.GpsRawInt.id,
-            m.PositionTargetGlobalInt.id,
-        ),
-        3: (),  # RC_CHANNELS
-        6: (m.GlobalPositionInt.id, m.LocalPositionNed.id),  # POSITION
-        10: (m.Attitude.id,),  # EXTRA1
-        11: (m.VfrHud.id,),  # EXTRA2
-        12: (m.SystemTime.id, m.BatteryStatus.id),  # EXTRA3
-    },
-)
-
-#: close to PX4's streams to an onboard computer, in whole control periods
-PX4_STREAMS = StreamTable(
-    intervals={
-        m.Heartbeat.id: 1.0,
-        m.Attitude.id: 0.025,
-        m.LocalPositionNed.id: 0.05,
-        m.GlobalPositionInt.id: 0.1,
-        m.VfrHud.id: 0.1,
-        m.PositionTargetGlobalInt.id: 0.1,
-        m.GpsRawInt.id: 0.2,
-        m.SysStatus.id: 0.2,
-        m.ExtendedSysState.id: 0.2,
-        m.SystemTime.id: 1.0,
-        m.MissionCurrent.id: 1.0,
-        m.HomePosition.id: 2.0,
-        m.BatteryStatus.id: 2.0,
-        m.CurrentMode.id: 2.0,
-        m.GpsGlobalOrigin.id: OFF,
-        m.AutopilotVersion.id: OFF,
-        m.ProtocolVersion.id: OFF,
-    },
-    shortest_interval=0.001,
-    groups={},  # it ignores REQUEST_DATA_STREAM
-)
-
-
-def with_sticks(table: StreamTable, unasked: float) -> StreamTable:
-    """Return the table with RC_CHANNELS every ``unasked`` seconds."""
-    message_id = m.RcChannels.id
-    groups = dict(table.groups)
-    if RC_GROUP in groups:
-        groups[RC_GROUP] = (*groups[RC_GROUP], message_id)
-    return replace(table, intervals={**table.intervals, message_id: unasked}, groups=groups)
 
 
 class Streams:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavLandedState, MavModeFlag, MavType
+from mav_tasks.mavlink.enums import MavModeFlag, MavType
 from mav_tasks.mavlink.messages import Message
 from rover_sim.available_modes import standard_mode_of
 from rover_sim.boot import Boot
@@ -14,7 +14,7 @@ from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
 from rover_sim.mission_conventions import FENCE, MISSION, RALLY
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
-from rover_sim.personas import GEOFENCE, Persona
+from rover_sim.personas import Persona
 from rover_sim.realism import Realism
 from rover_sim.sticks import Sticks
 
@@ -24,7 +24,7 @@ UNKNOWN_U16 = 65535
 # MAV_SYS_STATUS_SENSOR: gyro, accelerometer, compass, GPS, yaw and position control, motors, AHRS,
 # pre-arm check. MAVSDK derives "healthy" from these.
 SENSORS = 0x1 | 0x2 | 0x4 | 0x20 | 0x1000 | 0x4000 | 0x8000 | 0x200000 | 0x10000000
-PREARM = 0x10000000
+PREARM, GEOFENCE = 0x10000000, 0x100000
 NO_ALTITUDE = 140  # mm, recorded from ArduPilot before it has an origin
 RSSI_UNKNOWN = 255
 CELL_VOLTAGES = (12600,) + (UNKNOWN_U16,) * 9  # mV; ArduPilot puts the pack's total into the first
@@ -118,7 +118,7 @@ class Telemetry:
 
     def _sys_status(self, _estimate: Estimate, boot_ms: int) -> Message:
         present = SENSORS
-        if self._persona.shows_prearm_in_health_only:
+        if not self._persona.enables_prearm:
             present &= ~PREARM
         healthy = present | self._persona.also_healthy | PREARM
         if not self._boot.is_healthy(now=self._time(boot_ms)):
@@ -132,12 +132,8 @@ class Telemetry:
         )  # load 10 %, 12.6 V, 5 A
 
     def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:
-        armed = self._flight.armed
-        if self._persona.tells_no_landed_state:
-            return m.ExtendedSysState(0, MavLandedState.UNDEFINED)
-        return m.ExtendedSysState(
-            0, self._persona.landed_state_armed if armed else MavLandedState.ON_GROUND
-        )
+        armed, disarmed = self._persona.landed_states
+        return m.ExtendedSysState(0, armed if self._flight.armed else disarmed)
 
     def _system_time(self, _estimate: Estimate, boot_ms: int) -> Message:
         unix = self._unix_offset + self._started + boot_ms * 1e-3 if self._unix_offset else 0.0
@@ -244,7 +240,7 @@ class Telemetry:
             0,
             0,
             0,
-            tuple(persona.firmware_hash),
+            tuple(persona.firmware_hash.encode()),
             none,
             none,
             0,
