@@ -6,15 +6,15 @@ MAVLink guide, "Mission Protocol"; the persona's ``MissionConventions`` has what
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from struct import pack
+from typing import Any
 from zlib import crc32
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavFrame, MavMissionResult, MavSeverity
-from rover_sim.dispatch import Handler
-from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
-from rover_sim.mission_conventions import ALL, FENCE, MISSION, RALLY, MissionConventions
-from rover_sim.outbox import Outbox
+from rover_sim.geo import is_on_earth
+from rover_sim.mission_conventions import ALL, FENCE, MISSION, RALLY
+from rover_sim.onboard import Onboard
 from rover_sim.route import Route, Waypoint
 from rover_sim.setpoints import Destination
 
@@ -38,17 +38,19 @@ class _Upload:
 class MissionStorage:
     """Three lists of items and at most one upload. They survive a reboot."""
 
-    def __init__(self, *, conventions: MissionConventions, origin: Origin, outbox: Outbox) -> None:
-        self._conventions = conventions
-        self._origin = origin
-        self._outbox = outbox
+    def __init__(self, on: Onboard, go_to: Callable[[Destination], bool]) -> None:
+        """``go_to`` drives to the place of a guided item; it returns False if refused."""
+        self._on = on
+        self._conventions = on.persona.missions
+        self._origin = on.origin
+        self._outbox = on.outbox
+        self._drive_to = go_to
         self._lists: dict[int, list[messages.MissionItemInt]] = {MISSION: [], FENCE: [], RALLY: []}
         self._upload: _Upload | None = None
         self._stored: _Upload | None = None  # the last complete upload
         self.current = 0  # where AUTO resumes, on makes that resume
         self.complete = False  # AUTO reached the end of the mission
-        self.go_to: Callable[[Destination, float], bool] = lambda _place, _now: False
-        self.handlers: Mapping[int, Handler] = {
+        self.handlers: Mapping[int, Callable[[Any, Address], None]] = {
             messages.MissionCount.id: self._handle_count,
             messages.MissionItemInt.id: self._handle_item,
             messages.MissionItem.id: self._handle_item,
@@ -58,9 +60,6 @@ class MissionStorage:
             messages.MissionClearAll.id: self._handle_clear_all,
             messages.MissionAck.id: self._handle_ack,
         }
-
-    def __repr__(self) -> str:
-        return f"MissionStorage({[len(items) for items in self._lists.values()]})"
 
     def stored(self, mission_type: int) -> tuple[messages.MissionItemInt, ...]:
         """Return the items of a plan, as a download would return them."""
@@ -78,7 +77,7 @@ class MissionStorage:
             for seq, item in enumerate(self._lists[MISSION])
             if seq >= self._first_item and item.command == NAV_WAYPOINT
         )
-        return Route(waypoints, loop=False) if waypoints else None
+        return Route(waypoints) if waypoints else None
 
     def move_to(self, seq: int) -> bool:
         """Set the item at which AUTO continues; return False if it does not exist.
@@ -99,25 +98,25 @@ class MissionStorage:
             return 0
         return crc32(b"".join(_content(item) for item in items)) or 1
 
-    def step(self, *, now: float) -> None:
+    def step(self) -> None:
         """Repeat an unanswered request; end the upload after its time-out."""
         upload = self._upload
         if upload is None:
             return
         conventions = self._conventions
-        if now - upload.last_item_at >= conventions.upload_timeout:
+        if self._on.now - upload.last_item_at >= conventions.upload_timeout:
             self._outbox.say(MavSeverity.WARNING, conventions.timeout_text)
             self._upload = None
             if conventions.timeout_result is not None:
                 self._ack(upload.partner, upload.mission_type, conventions.timeout_result)
-        elif now - upload.asked_at >= conventions.request_interval:
-            self._ask(upload, now)
+        elif self._on.now - upload.asked_at >= conventions.request_interval:
+            self._ask(upload)
 
     @property
     def _first_item(self) -> int:
         return 1 if self._conventions.home_is_item_0 else 0
 
-    def _handle_count(self, message: messages.MissionCount, sender: Address, now: float) -> None:
+    def _handle_count(self, message: messages.MissionCount, sender: Address) -> None:
         mission_type, conventions = message.mission_type, self._conventions
         if mission_type not in self._lists:
             self._ack(sender, mission_type, conventions.unknown_type)
@@ -128,17 +127,17 @@ class MissionStorage:
                 self._outbox.say(MavSeverity.WARNING, conventions.full_text)
             self._ack(sender, mission_type, MavMissionResult.NO_SPACE)
         else:
-            upload = _Upload(sender, mission_type, message.count, last_item_at=now, asked_at=now)
+            upload = _Upload(sender, mission_type, message.count, self._on.now, self._on.now)
             if message.count == 0:
                 self._store(upload)
             else:
                 self._upload = upload
-                self._ask(upload, now)
+                self._ask(upload)
 
-    def _handle_item(self, message: Item, sender: Address, now: float) -> None:
+    def _handle_item(self, message: Item, sender: Address) -> None:
         upload = self._upload
         if self._conventions.takes_guided_items and message.current == GUIDED_ITEM:
-            self._go_to(message, sender, now)
+            self._go_to(message, sender)
         elif upload is None or upload.partner != sender:
             self._handle_stray_item(message, sender)
         elif message.seq != len(upload.items):
@@ -149,19 +148,19 @@ class MissionStorage:
             self._ack(sender, upload.mission_type, refusal)
         else:
             upload.items.append(self._as_stored(message))
-            upload.last_item_at = now
+            upload.last_item_at = self._on.now
             if len(upload.items) == upload.count:
                 self._store(upload)
             else:
-                self._ask(upload, now)
+                self._ask(upload)
 
-    def _go_to(self, item: Item, sender: Address, now: float) -> None:
+    def _go_to(self, item: Item, sender: Address) -> None:
         """Drive to an item with current = 2, which older stations send; plans have none."""
         refusal = self._refusal(item, MISSION)
         if refusal is None:
             latitude, longitude = _place_of(item)
             place = Destination(*self._origin.to_local(round(latitude), round(longitude)))
-            refusal = None if self.go_to(place, now) else MavMissionResult.ERROR
+            refusal = None if self._drive_to(place) else MavMissionResult.ERROR
         self._ack(sender, MISSION, refusal or MavMissionResult.ACCEPTED)
 
     def _handle_stray_item(self, message: Item, sender: Address) -> None:
@@ -177,9 +176,7 @@ class MissionStorage:
         else:
             self._ack(sender, message.mission_type, MavMissionResult.ERROR)
 
-    def _handle_request_list(
-        self, message: messages.MissionRequestList, sender: Address, _now: float
-    ) -> None:
+    def _handle_request_list(self, message: messages.MissionRequestList, sender: Address) -> None:
         stored = self._lists.get(message.mission_type)
         if stored is None:
             self._ack(sender, message.mission_type, self._conventions.unknown_type)
@@ -189,7 +186,7 @@ class MissionStorage:
                 messages.MissionCount(*sender, len(stored), message.mission_type, plan_id),
             )
 
-    def _handle_request(self, message: Request, sender: Address, _now: float) -> None:
+    def _handle_request(self, message: Request, sender: Address) -> None:
         stored = self._lists.get(message.mission_type, [])
         if message.seq >= len(stored):
             self._ack(sender, message.mission_type, MavMissionResult.ERROR)
@@ -197,9 +194,7 @@ class MissionStorage:
         item = stored[message.seq]
         self._outbox.send(_item_for(sender, item, item.frame, item.x, item.y))
 
-    def _handle_clear_all(
-        self, message: messages.MissionClearAll, sender: Address, _now: float
-    ) -> None:
+    def _handle_clear_all(self, message: messages.MissionClearAll, sender: Address) -> None:
         for mission_type, stored in self._lists.items():
             if message.mission_type in (mission_type, ALL):
                 stored.clear()
@@ -207,7 +202,7 @@ class MissionStorage:
                     self._begin_anew()
         self._ack(sender, message.mission_type, MavMissionResult.ACCEPTED)
 
-    def _handle_ack(self, message: messages.MissionAck, sender: Address, _now: float) -> None:
+    def _handle_ack(self, message: messages.MissionAck, sender: Address) -> None:
         """End a cancelled upload; other acks end a download, which has no state here."""
         upload = self._upload
         if upload is None or upload.partner != sender:
@@ -234,11 +229,11 @@ class MissionStorage:
         origin = self._origin
         home = items[0]
         home.frame, home.command = MavFrame.GLOBAL, NAV_WAYPOINT
-        home.x, home.y = origin.latitude_degE7, origin.longitude_degE7
+        home.x, home.y = origin.in_degrees_e7
         home.z = origin.altitude
 
-    def _ask(self, upload: _Upload, now: float) -> None:
-        upload.asked_at = now
+    def _ask(self, upload: _Upload) -> None:
+        upload.asked_at = self._on.now
         is_int = self._conventions.requests_int
         request = messages.MissionRequestInt if is_int else messages.MissionRequest
         self._outbox.send(request(*upload.partner, len(upload.items), upload.mission_type))
@@ -256,9 +251,9 @@ class MissionStorage:
         if item.command not in self._conventions.storable[mission_type]:
             return MavMissionResult.UNSUPPORTED
         latitude, longitude = _place_of(item)
-        if not abs(latitude) <= LATITUDE_LIMIT_DEGE7:  # NaN (float form) fails, too
+        if not is_on_earth(latitude, 0):
             return MavMissionResult.INVALID_PARAM5_X
-        if not abs(longitude) <= LONGITUDE_LIMIT_DEGE7:
+        if not is_on_earth(0, longitude):
             return MavMissionResult.INVALID_PARAM6_Y
         return None
 

@@ -2,12 +2,12 @@
 
 ``ardupilot`` is Rover 4.6.3 as observed on the wire; ``px4`` is a rover on PX4 1.17, from its
 sources and as observed; ``generic`` speaks as PX4 does. Only flight and drive train are code of
-their own; no code tests a persona's name.
+their own (``stack``); no code tests a persona's name.
 """
 
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, is_dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, is_dataclass, replace
 from enum import Enum
 from functools import cache
 from itertools import repeat
@@ -16,22 +16,13 @@ from types import UnionType
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
 from mav_tasks.mavlink import messages
-from mav_tasks.mavlink.enums import MavAutopilot, MavLandedState
-from rover_sim.ardupilot_commands import ardupilot_commands
-from rover_sim.ardupilot_rules import ArduPilotRules
-from rover_sim.available_modes import OfferedMode
+from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavLandedState, MavResult
 from rover_sim.boot import BootScript
-from rover_sim.commands import CommandParts, CommandTable
-from rover_sim.drive_train import DriveTrain, ardupilot_drive, px4_drive
-from rover_sim.flight_rules import FlightParts, FlightRules
 from rover_sim.frames import Frame
-from rover_sim.home import HomeRule
 from rover_sim.mission_conventions import MissionConventions
 from rover_sim.modes import Mode as Mode
 from rover_sim.modes import ModeNumbers
-from rover_sim.parameters import INT8, INT16, INT32, REAL32, Parameter, Parameters
-from rover_sim.px4_commands import px4_commands
-from rover_sim.px4_rules import Px4Rules
+from rover_sim.parameters import INT8, INT16, INT32, REAL32, Parameter
 from rover_sim.realism import (
     SHORT,
     BootTimes,
@@ -45,6 +36,34 @@ from rover_sim.streams import StreamTable
 
 ASSETS = Path(__file__).parent / "assets"
 TYPES = {"int8": INT8, "int16": INT16, "int32": INT32}
+
+
+@dataclass(frozen=True, slots=True)
+class OfferedMode:
+    """One mode as a client displays it."""
+
+    mode: Mode
+    standard: int  # MAV_STANDARD_MODE
+    name: str  # empty for a standard mode: the client names it
+    properties: int  # MAV_MODE_PROPERTY
+
+
+@dataclass(frozen=True, slots=True)
+class HomeRule:
+    """Conditions in which one make moves home, as on the real autopilots.
+
+    From the sources of ArduPilot Rover 4.6 (commands.cpp, update_home) and PX4 1.17
+    (HomePosition.cpp): while disarmed, home follows the rover. DO_SET_HOME fixes it: on ArduPilot
+    in either form, until a restart; on PX4 only with a place, not with "here". Not imitated: PX4
+    forgets such a place when it corrects home's altitude, by more than 1 m and within 120 s of an
+    arming.
+    """
+
+    where_armed: bool  # sets home at each arming
+    least_move: float  # m; while disarmed, home follows a rover that is at least this far away
+    here_is_kept: bool  # DO_SET_HOME with "here" also fixes home
+    nowhere_is_here: bool  # DO_SET_HOME to 0/0 is the rover's position, not refused
+    is_told: bool  # HOME_POSITION is sent when home moves; else only as it streams
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +95,14 @@ class Persona:
     lacks: frozenset[int]  # ids of messages that this make cannot send
     accepted_in_silence: frozenset[int]  # ids of REQUEST_MESSAGE: accepted, but not sent
     streams: StreamTable
-    rules: Callable[[FlightParts], FlightRules]
-    commands: Callable[[CommandParts], CommandTable]
-    drive: Callable[[Frame, Parameters], DriveTrain]
+    stack: str  # whose flight and drive train
+    commands: Mapping[int, str]  # a method of Commands, or the name of a MAV_RESULT, by MAV_CMD
+    results: Mapping[str, MavResult]  # of what is refused
+    set_mode_acked_as: int  # the command id in the COMMAND_ACK of the message SET_MODE
+    force_arm: tuple[float, ...]  # param2 of COMPONENT_ARM_DISARM that skips the checks
+    texts: Mapping[str, str]  # also the names of modes; empty: nothing is said
+    position_lost: Mode  # entered if the position is lost in a mode that needs it
+    drives_square: bool  # in AUTO without a mission
     missions: MissionConventions
     #: integer parameters are sent as their bytes in a float, not as numbers; the list is sorted,
     #: and has a hash
@@ -96,6 +120,10 @@ class Persona:
     frames: Mapping[Frame, FrameTraits]
     frame: Frame  # how it steers
     parameters: tuple[Parameter, ...]
+    #: COM_OBL_RC_ACT and NAV_RCL_ACT: a mode, or disarm. A mode of the sticks needs them; without,
+    #: the second table applies
+    offboard_loss: Mapping[int, str] = field(default_factory=dict)
+    stick_loss: Mapping[int, str] = field(default_factory=dict)
     runtime_parameter: str | None = None  # counts its seconds of runtime, and is sent unasked
 
     def on(self, frame: Frame) -> "Persona":
@@ -119,8 +147,7 @@ def _table(name: str) -> dict[str, Any]:
     return tomllib.loads((ASSETS / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def _persona(table: dict[str, Any], **code: Any) -> Persona:
-    """Return the persona of a table, with the parts that are code."""
+def _persona(table: dict[str, Any]) -> Persona:
     frames = {}
     for frame, traits in table["frames"].items():
         values = table["parameters"] | traits["parameters"]
@@ -130,7 +157,7 @@ def _persona(table: dict[str, Any], **code: Any) -> Persona:
     boot = _value(BootTimes, table["boot"])
     realism = {"boot": boot.scaled(SHORT), "timing": table["timing"]}
     more = {"realism": realism, "frames": frames, "parameters": ()}
-    given: Persona = _value(Persona, {**table, **code, **more})
+    given: Persona = _value(Persona, {**table, **more})
     return given.on(given.frame)
 
 
@@ -157,23 +184,21 @@ def _value(kind: Any, given: Any) -> Any:
         kinds = inner if len(inner) > 1 and inner[1] is not Ellipsis else repeat(inner[0])
         return origin(map(_value, kinds, given))
     if is_dataclass(kind) and isinstance(given, dict | list):
-        hints, make = _hints(kind), cast(Any, kind)
+        make = cast(Any, kind)
+        hints = _hints(make)
         named = given.items() if isinstance(given, dict) else zip(hints, given, strict=False)
         return make(**{name: _value(hints[name], each) for name, each in named})
     if isinstance(given, str) and isinstance(kind, type) and issubclass(kind, Enum):
         return kind[given.upper()]
     if isinstance(given, str) and kind is int:
+        if given in MavCmd.__members__:
+            return MavCmd[given]
         return int(given) if given.isdecimal() else getattr(messages, given).id
     return given
 
 
 _hints = cache(get_type_hints)
 
-ARDUPILOT = _persona(
-    _table("ardupilot"), rules=ArduPilotRules, commands=ardupilot_commands, drive=ardupilot_drive
-)
-PX4_CODE: dict[str, Any] = {"rules": Px4Rules, "commands": px4_commands, "drive": px4_drive}
-_PX4_TABLE = _table("px4")
-PX4 = _persona(_PX4_TABLE, **PX4_CODE)
-GENERIC = _persona(_PX4_TABLE | _table("generic"), **PX4_CODE)
+_PX4 = _table("px4")
+ARDUPILOT, PX4, GENERIC = map(_persona, (_table("ardupilot"), _PX4, _PX4 | _table("generic")))
 PERSONAS: Mapping[str, Persona] = {each.name: each for each in (ARDUPILOT, PX4, GENERIC)}

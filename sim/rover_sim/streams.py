@@ -25,7 +25,7 @@ class StreamTable:
 class Streams:
     """The interval and next due time of each message. One set for the whole link."""
 
-    def __init__(self, table: StreamTable, *, now: float) -> None:
+    def __init__(self, table: StreamTable, now: float) -> None:
         self._table = table
         self._intervals = dict(table.intervals)
         self._due = {
@@ -44,7 +44,7 @@ class Streams:
             return 0
         return -1 if interval == OFF else round(min(interval * 1e6, LONGEST_TOLD))
 
-    def set_interval(self, message_id: int, interval_us: float, *, now: float) -> bool:
+    def set_interval(self, message_id: int, interval_us: float, now: float) -> bool:
         """Set the interval in µs; 0 is the default, -1 off. Return False if refused."""
         if message_id not in self._intervals:
             return False
@@ -58,7 +58,7 @@ class Streams:
             self._set(message_id, interval_us * 1e-6, now)
         return True
 
-    def set_group(self, group: int, rate: float, *, now: float) -> None:
+    def set_group(self, group: int, rate: float, now: float) -> None:
         """Set a whole group's rate in Hz; 0 switches it off."""
         members: Iterable[int] = self._table.groups.get(group, ())
         if group == ALL_STREAMS:
@@ -67,7 +67,7 @@ class Streams:
         for message_id in members:
             self._set(message_id, interval, now)
 
-    def take_due(self, *, now: float) -> list[int]:
+    def take_due(self, now: float) -> list[int]:
         """Return the ids that are due, and set the next due time of each."""
         horizon = now + JITTER
         if horizon < self._next:
