@@ -120,9 +120,9 @@ ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
     "disarm": ("disarm", _plain(Disarm())),
 }
 HELP = (
-    f"cause a fault at the given time, for example '{EXAMPLE}'; repeatable."
+    f"Cause a fault at the given time, for example '{EXAMPLE}'; repeatable."
     f" Faults: {'; '.join(form for form, _ in ACTIONS.values())}."
-    " Prefix 'rover 2' selects one of several rovers; without 'for' the fault is permanent"
+    " Prefix 'rover 2' selects one of several rovers; without 'for' the fault is permanent."
 )
 
 
