@@ -24,7 +24,7 @@ from rover_sim.body import Body, Pose
 from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet
 from rover_sim.errors import MissingExtra, SimulatedCrash
 from rover_sim.fault_plan import HELP, PlanError, PlannedFault, check_rovers, read_fault
-from rover_sim.fault_player import FaultPlayer, HandledRover
+from rover_sim.fault_player import FaultPlayer
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.manual_control import BodyByHand
@@ -228,20 +228,17 @@ def sim(
             clock = Clock(speed)
             now = clock.now()  # one start time for all rovers, so that they wake up together
             rovers = [
-                HandledRover(
-                    make_vehicle(
-                        each,
-                        system_id=number,
-                        now=now,
-                        persona=make,
-                        unix_offset=time.time() - now,
-                        key=key,
-                        origin=place.origin,
-                        realism=realism,
-                        seed=(seed or 0) + index,
-                        peers=answers,
-                    ),
+                make_vehicle(
                     each,
+                    system_id=number,
+                    now=now,
+                    persona=make,
+                    unix_offset=time.time() - now,
+                    key=key,
+                    origin=place.origin,
+                    realism=realism,
+                    seed=(seed or 0) + index,
+                    peers=answers,
                 )
                 for index, (number, each) in enumerate(zip(numbers, bodies, strict=True))
             ]
@@ -249,11 +246,10 @@ def sim(
             what = ", ".join([persona, body, *([] if frame is None else [frame.value])])
             for number, rover in zip(numbers, rovers, strict=True):
                 if sticks is not None:
-                    rover.vehicle.autopilot.operator_pulses(*sticks)
+                    rover.autopilot.operator_pulses(*sticks)
                 sys.stdout.write(f"rover_sim: rover {number} ({what}) on udp {where}\n")
             sys.stdout.flush()
-            vehicles = [rover.vehicle for rover in rovers]
-            drive(server, stop, vehicles, clock, poses, FaultPlayer(faults, rovers))
+            drive(server, stop, rovers, clock, poses, FaultPlayer(faults, rovers))
     except (StartError, MissingExtra) as error:
         sys.stderr.write(f"rover_sim: {error}\n")
         raise typer.Exit(USAGE_ERROR) from None

@@ -8,11 +8,14 @@
 import re
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
-from math import radians
+from math import inf, radians
+from typing import cast
 
 from rover_sim.actuators import Actuator, output_of, wheels_of
-from rover_sim.faults import Faults
+from rover_sim.faults import NO_FAULTS, Faults
 from rover_sim.frames import Frame
+from rover_sim.manual_control import BodyByHand
+from rover_sim.vehicle import Vehicle
 
 FORM = re.compile(
     r"(?:rover\s+(?P<rover>\d+)\s+)?at\s+(?P<at>[\d.]+)\s*s?\s*:\s*(?P<name>[a-z-]+)"
@@ -30,30 +33,12 @@ class PlanError(Exception):
 class Lasting:
     """A fault that lasts until its end."""
 
-    faults: Faults = Faults()  # noqa: RUF009  # frozen
+    faults: Faults = NO_FAULTS
     blocked: frozenset[Actuator] = frozenset()
 
 
-@dataclass(frozen=True, slots=True)
-class Push:
-    """A displacement, in the rover's own axes."""
-
-    forward: float = 0.0  # m
-    right: float = 0.0  # m
-    turn: float = 0.0  # rad, clockwise
-
-
-@dataclass(frozen=True, slots=True)
-class Reboot:
-    """A restart of the autopilot."""
-
-
-@dataclass(frozen=True, slots=True)
-class Disarm:
-    """Disarming at the rover, by a person."""
-
-
-Event = Lasting | Push | Reboot | Disarm
+#: what happens at once, to a vehicle at a time
+Event = Callable[[Vehicle, float], None]
 Words = tuple[str, ...]
 
 
@@ -64,41 +49,40 @@ class PlannedFault:
     text: str  # as given
     rover: int | None  # system id; None: every rover
     at: float  # s since the simulator started
-    event: Event
-    lasts: float | None  # s; None: for good, or a momentary event
+    event: Lasting | Event
+    lasts: float = inf  # s
 
 
-def _block_wheel(words: Words, _frame: Frame) -> Event:
+def _block_wheel(words: Words, _frame: Frame) -> Lasting:
     return Lasting(blocked=wheels_of(_only(words, "left, right or all")))
 
 
-def _freeze_output(words: Words, frame: Frame) -> Event:
+def _freeze_output(words: Words, frame: Frame) -> Lasting:
     output = output_of(_only(words, "the name of an output"), frame)
     return Lasting(Faults(outputs_frozen=frozenset({output})))
 
 
 def _push(words: Words, _frame: Frame) -> Event:
-    metres, direction = _amount(words, unit="m", default="forward")
-    known = {
-        "forward": Push(forward=metres),
-        "back": Push(forward=-metres),
-        "right": Push(right=metres),
-        "left": Push(right=-metres),
-    }
-    if direction not in known:
-        raise ValueError(f"expected {', '.join(known)}, not {direction!r}")
-    return known[direction]
+    metres, direction = _amount(words, unit="m", known=("forward", "back", "left", "right"))
+    signed = -metres if direction in ("back", "left") else metres
+    is_along = direction in ("forward", "back")
+    return _moved(*((signed, 0.0) if is_along else (0.0, signed)), 0.0)
 
 
 def _turn(words: Words, _frame: Frame) -> Event:
-    degrees, direction = _amount(words, unit="deg", default="right")
-    if direction not in ("right", "left"):
-        raise ValueError(f"expected right or left, not {direction!r}")
-    return Push(turn=radians(degrees if direction == "right" else -degrees))
+    degrees, direction = _amount(words, unit="deg", known=("right", "left"))
+    return _moved(0.0, 0.0, radians(degrees if direction == "right" else -degrees))
 
 
-def _plain(event: Event) -> Callable[[Words, Frame], Event]:
-    def read(words: Words, _frame: Frame) -> Event:
+def _moved(forward: float, right: float, turn: float) -> Event:
+    def push(vehicle: Vehicle, _now: float) -> None:
+        cast(BodyByHand, vehicle.body).push(forward, right, turn)
+
+    return push
+
+
+def _plain(event: Lasting | Event) -> Callable[[Words, Frame], Lasting | Event]:
+    def read(words: Words, _frame: Frame) -> Lasting | Event:
         if words:
             raise ValueError(f"unexpected {' '.join(words)!r}")
         return event
@@ -107,7 +91,7 @@ def _plain(event: Event) -> Callable[[Words, Frame], Event]:
 
 
 #: action name: its syntax for the user, and its parser
-ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
+ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Lasting | Event]]] = {
     "block-wheel": ("block-wheel left|right|all", _block_wheel),
     "freeze-output": ("freeze-output left|right (ackermann: throttle|steering)", _freeze_output),
     "lose-gps": ("lose-gps", _plain(Lasting(Faults(gps_lost=True)))),
@@ -116,8 +100,11 @@ ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
     "cut-link": ("cut-link", _plain(Lasting(Faults(silent=True, deaf=True)))),
     "push": ("push 0.5 m forward|back|left|right", _push),
     "turn": ("turn 30 deg right|left", _turn),
-    "reboot": ("reboot", _plain(Reboot())),
-    "disarm": ("disarm", _plain(Disarm())),
+    "reboot": ("reboot", _plain(lambda vehicle, now: vehicle.autopilot.reboot(now=now))),
+    "disarm": (
+        "disarm",
+        _plain(lambda vehicle, now: vehicle.autopilot.operator_arm(False, now=now)),
+    ),
 }
 HELP = (
     f"Cause a fault at the given time, for example '{EXAMPLE}'; repeatable."
@@ -139,8 +126,8 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
         event = read(tuple(form["rest"].lower().split()), frame)
     except ValueError as error:
         raise PlanError(f"{text!r}: {error}; write: {written}") from error
-    lasts = None if form["lasts"] is None else _seconds(form["lasts"], text)
-    if lasts is not None and not isinstance(event, Lasting):
+    lasts = inf if form["lasts"] is None else _seconds(form["lasts"], text)
+    if form["lasts"] is not None and not isinstance(event, Lasting):
         raise PlanError(f"{text!r}: {name} is over at once, leave out 'for'")
     rover = None if form["rover"] is None else int(form["rover"])
     return PlannedFault(text.strip(), rover, _seconds(form["at"], text), event, lasts)
@@ -159,7 +146,7 @@ def _only(words: Words, what: str) -> str:
     return words[0]
 
 
-def _amount(words: Words, *, unit: str, default: str) -> tuple[float, str]:
+def _amount(words: Words, *, unit: str, known: Words) -> tuple[float, str]:
     """Return the number and the direction of "0.5 m left", "0.5m left", "left 0.5 m"."""
     joined = re.fullmatch(
         rf"(?:(?P<before>[a-z]+) )?(?P<number>[\d.]+) ?(?:{unit})?(?: (?P<after>[a-z]+))?",
@@ -167,7 +154,10 @@ def _amount(words: Words, *, unit: str, default: str) -> tuple[float, str]:
     )
     if joined is None or (joined["before"] and joined["after"]):
         raise ValueError("expected an amount and a direction")
-    return float(joined["number"]), joined["before"] or joined["after"] or default
+    direction = joined["before"] or joined["after"] or known[0]
+    if direction not in known:
+        raise ValueError(f"expected {', '.join(known)}, not {direction!r}")
+    return float(joined["number"]), direction
 
 
 def check_rovers(plan: Iterable[PlannedFault], numbers: Container[int]) -> None:

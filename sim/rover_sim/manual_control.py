@@ -47,6 +47,12 @@ class BodyByHand:
         north, east = turned(state.north, state.east, turn)
         self._offset = Pose(north=pose.north - north, east=pose.east - east, yaw=turn)
 
+    def push(self, forward: float, right: float, turn: float) -> None:
+        """Move the rover by metres along its own axes, then turn it clockwise by radians."""
+        state = self.state
+        north, east = turned(forward, right, state.yaw)
+        self.place(Pose(state.north + north, state.east + east, state.yaw + turn))
+
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
         """Demand a motion, kept until the next call; blocked wheels stand."""
         self._body.drive(*with_blocked((forward_speed, yaw_rate), self.blocked, self._frame))

@@ -50,7 +50,7 @@ class RoverWorld:
         self._numbers = count(1)
         self._bodies: list[BodyByHand] = []
         self.rovers = tuple(self._add_rover(number) for number in range(1, options.count + 1))
-        names = tuple(_name_of(rover.system_id) for rover in self.rovers)
+        names = tuple(f"rover{rover.system_id}" for rover in self.rovers)
         self.server = TaskServer(
             self._world, vehicles=names, settings=settings, wall_offset=self._began
         )
@@ -157,18 +157,13 @@ class RoverWorld:
         persona = self.options.make
         body = BodyByHand(self._make_body(number), frame=persona.frame)
         self._bodies.append(body)
-        vehicle = make_vehicle(
-            body,
-            system_id=number,
-            now=0.0,
-            persona=persona,
-            seed=self.seed + number,
-        )
+        seed = self.seed + number
+        vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona, seed=seed)
         if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
             # Hold: by default a PX4 rover drives home when setpoints stop, and the server drives no
             # task
             vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = 5
-        self._world.join(RoverParty(vehicle, self._net.link(_name_of(number))))
+        self._world.join(RoverParty(vehicle, self._net.link(f"rover{number}")))
         return SimulatedRover(vehicle, body, persona=persona, clock=lambda: self.now)
 
     def _make_body(self, number: int) -> Body:
@@ -177,10 +172,6 @@ class RoverWorld:
         if self.options.body == "kinematic":
             return kinematic_body(frame, start=start, slip=SLIP, seed=seed)
         return BulletBody(start=start, frame=frame, variation=VARIATION, seed=seed)
-
-
-def _name_of(number: int) -> str:
-    return f"rover{number}"
 
 
 def _is_in_a_loop() -> bool:

@@ -3,12 +3,11 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import degrees
-from typing import Any
 
 from rover_sim.actuators import output_of, wheels_of
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
-from rover_sim.manual_control import BodyByHand, turned
+from rover_sim.manual_control import BodyByHand
 from rover_sim.modes import Mode
 from rover_sim.personas import Persona
 from rover_sim.vehicle import Vehicle
@@ -22,7 +21,7 @@ class SimulatedRover:
     def __init__(
         self, vehicle: Vehicle, body: BodyByHand, *, persona: Persona, clock: Callable[[], float]
     ) -> None:
-        self._vehicle = vehicle
+        self._autopilot = vehicle.autopilot
         self._body = body
         self._persona = persona
         self._clock = clock
@@ -37,7 +36,7 @@ class SimulatedRover:
     @property
     def system_id(self) -> int:
         """Its MAVLink system id."""
-        return self._vehicle.autopilot.address.system_id
+        return self._autopilot.address.system_id
 
     @property
     def persona(self) -> str:
@@ -70,24 +69,20 @@ class SimulatedRover:
         return self._body.state.forward_speed
 
     @property
-    def yaw_rate(self) -> float:
-        """Radians per second, clockwise."""
-        return self._body.state.yaw_rate
-
-    @property
     def stands(self) -> bool:
         """Whether the rover stands still."""
-        return abs(self.speed) < STANDS and abs(self.yaw_rate) < STANDS
+        state = self._body.state
+        return abs(state.forward_speed) < STANDS and abs(state.yaw_rate) < STANDS
 
     @property
     def armed(self) -> bool:
         """Whether its motors are live."""
-        return self._vehicle.autopilot.armed
+        return self._autopilot.armed
 
     @property
     def mode(self) -> str:
         """Its mode: "guided", "hold", "manual", "auto", "rtl", "position" or "initialising"."""
-        return self._vehicle.autopilot.mode.value
+        return self._autopilot.mode.value
 
     # actions of a person beside the rover
 
@@ -95,20 +90,14 @@ class SimulatedRover:
         self, *, north: float | None = None, east: float | None = None, yaw: float | None = None
     ) -> None:
         """Move the rover to a pose at once; None keeps a value. Its motion continues."""
-        now = self._body.state
-        self._body.place(
-            Pose(
-                north=now.north if north is None else north,
-                east=now.east if east is None else east,
-                yaw=now.yaw if yaw is None else yaw,
-            )
-        )
+        given = {"north": north, "east": east, "yaw": yaw}
+        here = Pose(self.north, self.east, self.yaw)
+        named = {name: value for name, value in given.items() if value is not None}
+        self._body.place(replace(here, **named))
 
     def push(self, *, forward: float = 0.0, right: float = 0.0, turn: float = 0.0) -> None:
         """Move the rover at once by metres along its own axes, then turn it by radians."""
-        now = self._body.state
-        north, east = turned(forward, right, now.yaw)
-        self._body.place(Pose(now.north + north, now.east + east, now.yaw + turn))
+        self._body.push(forward, right, turn)
 
     def block_wheels(self, side: str = "all") -> None:
         """Block the wheels of one ``side``, "left" or "right", or all.
@@ -127,52 +116,40 @@ class SimulatedRover:
         "left" or "right"; an Ackermann rover has "throttle" and "steering". Raise ValueError for
         others.
         """
-        frozen = self._vehicle.autopilot.faults.outputs_frozen | {
-            output_of(name, self._persona.frame)
-        }
-        self._change_faults(outputs_frozen=frozen)
-
-    def free_outputs(self) -> None:
-        """Release every output."""
-        self._change_faults(outputs_frozen=frozenset())
+        frozen = {output_of(name, self._persona.frame)}
+        faults = self._autopilot.faults
+        self.set_faults(replace(faults, outputs_frozen=faults.outputs_frozen | frozen))
 
     def lose_gps(self) -> None:
         """Remove all satellites: after some seconds of driving, the position is lost."""
-        self._change_faults(gps_lost=True)
-
-    def regain_gps(self) -> None:
-        """Restore the satellites."""
-        self._change_faults(gps_lost=False)
+        self.set_faults(replace(self._autopilot.faults, gps_lost=True))
 
     def arm(self) -> None:
         """Arm the rover locally, without a MAVLink command."""
-        self._vehicle.autopilot.operator_arm(True, now=self._clock())
+        self._autopilot.operator_arm(True, now=self._clock())
 
     def disarm(self) -> None:
         """Disarm the rover locally, without a MAVLink command."""
-        self._vehicle.autopilot.operator_arm(False, now=self._clock())
+        self._autopilot.operator_arm(False, now=self._clock())
 
     def set_mode(self, mode: str) -> None:
         """Turn the mode switch. Raise ValueError for a mode that this make lacks."""
         known = [each.value for each in self._persona.modes.numbers]
         if mode not in known:
             raise ValueError(f"mode must be one of {', '.join(known)}, not {mode!r}")
-        self._vehicle.autopilot.operator_mode(Mode(mode), now=self._clock())
+        self._autopilot.operator_mode(Mode(mode), now=self._clock())
 
     def hold_sticks(self, *, forward: float = 0.0, yaw_rate: float = 0.0) -> None:
         """Hold the sticks of the remote control at m/s and rad/s.
 
         They drive in "manual"; on a realistic ArduPilot the throttle also adds speed in "guided".
         """
-        self._vehicle.autopilot.operator_sticks(forward, yaw_rate)
+        self._autopilot.operator_sticks(forward, yaw_rate)
 
     def reboot(self) -> None:
         """Restart the autopilot: for a second it neither receives nor sends."""
-        self._vehicle.autopilot.reboot(now=self._clock())
+        self._autopilot.reboot(now=self._clock())
 
     def set_faults(self, faults: Faults) -> None:
         """Replace the faults; ``Faults()`` clears them all."""
-        self._vehicle.autopilot.set_faults(faults)
-
-    def _change_faults(self, **changes: Any) -> None:
-        self.set_faults(replace(self._vehicle.autopilot.faults, **changes))
+        self._autopilot.set_faults(faults)
