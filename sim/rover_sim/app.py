@@ -1,4 +1,4 @@
-"""The command ``mav-tasks sim``: simulated rovers on one UDP socket, in real time or faster.
+"""The command ``mav-tasks sim``: simulated rovers on one UDP socket, in real time.
 
 This file has the command line, the socket and the signals; the loop is in ``real_time``.
 """
@@ -29,7 +29,7 @@ from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.manual_control import BodyByHand
 from rover_sim.personas import PERSONAS, Persona
-from rover_sim.real_time import Clock, drive
+from rover_sim.real_time import drive
 from rover_sim.realism import NO_BOOT, SHORT, Gps
 from rover_sim.realism_options import Place, StickPulses, read_place, read_sticks
 from rover_sim.vehicle import Peers, make_vehicle
@@ -38,7 +38,6 @@ SPACING = 3.0  # m between rovers, side by side
 KINEMATIC_SLIP = 0.3  # as for the pybullet rover
 TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
 MAX_FRICTION = 5.0  # above that of rubber on any surface
-FASTEST = 1000.0  # simulated seconds per second
 USAGE_ERROR = 2  # exit status, as Typer's own
 ABORTED = 134  # a shell's status for SIGABRT, with which a crashing SITL ends
 
@@ -55,12 +54,6 @@ def _number(text: str, is_good: Callable[[float], bool], what: str) -> float:
     if not is_good(value):  # NaN is never good
         raise BadParameter(f"must be {what}, not {text!r}")
     return value
-
-
-def read_speed(text: str) -> float:
-    """Parse ``--speed``. Raise BadParameter."""
-    what = f"'real' or a number above 0, at most {FASTEST:g}"
-    return 1.0 if text == "real" else _number(text, lambda speed: 0.0 < speed <= FASTEST, what)
 
 
 def read_friction(text: str) -> float:
@@ -116,15 +109,6 @@ def sim(
     gui: Annotated[
         bool, Option("--gui", help="Show the first rover in pybullet's window.")
     ] = False,
-    speed: Annotated[
-        float,
-        Option(
-            parser=read_speed,
-            metavar="real|NUMBER",
-            show_default="real",
-            help="Simulated seconds per real second.",
-        ),
-    ] = 1.0,
     truth: Annotated[
         str | None, Option(metavar="FILE", help="Append the true poses at 10 Hz as CSV.")
     ] = None,
@@ -225,8 +209,7 @@ def sim(
                 stack.callback(each.close)
             server = _open_socket(host, port, stack, is_allowed=insecure or key is not None)
             poses = None if truth is None else _open_truth(truth, stack)
-            clock = Clock(speed)
-            now = clock.now()  # one start time for all rovers, so that they wake up together
+            now = time.monotonic()  # one start time for all rovers, so that they wake up together
             rovers = [
                 make_vehicle(
                     each,
@@ -249,7 +232,7 @@ def sim(
                     rover.autopilot.operator_pulses(*sticks)
                 sys.stdout.write(f"rover_sim: rover {number} ({what}) on udp {where}\n")
             sys.stdout.flush()
-            drive(server, stop, rovers, clock, poses, FaultPlayer(faults, rovers))
+            drive(server, stop, rovers, poses, FaultPlayer(faults, rovers))
     except (StartError, MissingExtra) as error:
         sys.stderr.write(f"rover_sim: {error}\n")
         raise typer.Exit(USAGE_ERROR) from None

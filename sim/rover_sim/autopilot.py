@@ -4,11 +4,9 @@ It behaves like the autopilot of its persona. This file connects the parts and p
 to one of them; the parts have the rules.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
+from mav_tasks.mavlink.address import BROADCAST, Address
+from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.messages import Message
 from rover_sim.actuators import Motion, with_frozen
@@ -16,7 +14,7 @@ from rover_sim.ardupilot_drive import ArduPilotDrive
 from rover_sim.ardupilot_flight import ArduPilotFlight
 from rover_sim.body import BodyState
 from rover_sim.boot import Boot
-from rover_sim.commands import Commands, read_command
+from rover_sim.commands import Commands
 from rover_sim.estimate import estimate_from
 from rover_sim.estimator import Estimator
 from rover_sim.faults import NO_FAULTS, Faults
@@ -29,7 +27,7 @@ from rover_sim.personas import Mode, Persona
 from rover_sim.px4_drive import px4_drive
 from rover_sim.px4_flight import Px4Flight
 from rover_sim.realism import Realism
-from rover_sim.setpoints import Destination
+from rover_sim.setpoints import Destination, Global, Local
 from rover_sim.sticks import Sticks
 from rover_sim.streams import Streams
 from rover_sim.telemetry import Telemetry
@@ -46,16 +44,16 @@ STACKS = {"ardupilot": (ArduPilotFlight, ArduPilotDrive), "px4": (Px4Flight, px4
 
 
 class Autopilot:
-    """One rover's autopilot, address (system_id, 1).
+    """One rover's autopilot.
 
-    Call ``handle`` for each message, ``step`` once per control period, and ``take_messages`` after
+    Call ``handle`` for each message, ``step`` once per control period, and ``outbox.take`` after
     either. ``unix_offset`` is Unix time minus ``now``; with 0, SYSTEM_TIME says unknown.
     """
 
     def __init__(
         self,
+        address: Address,
         *,
-        system_id: int,
         persona: Persona,
         origin: Origin,
         unix_offset: float,
@@ -63,8 +61,9 @@ class Autopilot:
         now: float,
         realism: Realism,
         seed: int,
+        uid: int,
     ) -> None:
-        self.address = Address(system_id, AUTOPILOT)
+        self.address = address
         self._persona = persona
         errors = realism.estimator
         self._estimator = None if errors is None else Estimator(errors, seed=seed)
@@ -73,11 +72,14 @@ class Autopilot:
         self._outputs: Motion = (0.0, 0.0)  # of the motors
         self._unix_offset = unix_offset
         estimate = estimate_from(self._seen(truth), NO_FAULTS, None)
-        on = self._on = Onboard(persona, realism, origin, self.address, estimate, now)
-        self._outbox = on.outbox
-        on.parameters = Parameters(persona.parameters, on.outbox, bytewise=persona.bytewise)
-        on.parameters[persona.system_id_parameter] = system_id
-        on.missions = MissionStorage(on, self._go_to_item)
+        on = self._on = Onboard(persona, realism, origin, uid, estimate, now)
+        self.outbox = on.outbox
+        #: to read or to preset
+        self.parameters = Parameters(persona.parameters, on.outbox, bytewise=persona.bytewise)
+        self.parameters[persona.system_id_parameter] = address.system_id
+        on.parameters = self.parameters
+        #: the plans stored on board, for inspection
+        self.missions = on.missions = MissionStorage(on, self._go_to_item)
         on.sticks = Sticks(on)
         self._home_told: Destination
         self._clock_stopped_at = now  # time of the last step with a running clock
@@ -95,10 +97,12 @@ class Autopilot:
         on = self._on
         if on.outbox.faults.deaf or now < on.started or not self._is_for_us(message):
             return
-        if (handler := self._handlers.get(message.get_msgId())) is not None:
-            on.now = now
-            handler(message, sender)
-            self._announce()
+        name = f"on_{message.get_type().lower()}"
+        for part in (self, self.missions, self.parameters):
+            if (handler := getattr(part, name, None)) is not None:
+                on.now = now
+                handler(message, sender)
+                self._announce()
 
     def step(self, truth: BodyState, *, now: float) -> Motion:
         """Advance by one control period; return forward speed and yaw rate for the wheels."""
@@ -127,19 +131,6 @@ class Autopilot:
         self._outputs = outputs
         return outputs
 
-    def take_messages(self) -> list[Message]:
-        """Return the messages to send, each to everybody on the link."""
-        return self._outbox.take()
-
-    @property
-    def next_release(self) -> float:
-        """Time at which the next delayed message is due; infinity if there is none."""
-        return self._outbox.next_release
-
-    def release(self, *, now: float) -> None:
-        """Send the delayed messages that are due."""
-        self._outbox.release(now)
-
     @property
     def armed(self) -> bool:
         """Whether the motors are live."""
@@ -151,24 +142,14 @@ class Autopilot:
         return self._flight.mode
 
     @property
-    def missions(self) -> MissionStorage:
-        """The plans stored on board, for inspection."""
-        return self._on.missions
-
-    @property
-    def parameters(self) -> Parameters:
-        """The parameters, to read or to preset."""
-        return self._on.parameters
-
-    @property
     def faults(self) -> Faults:
         """The present faults."""
-        return self._outbox.faults
+        return self.outbox.faults
 
     def set_faults(self, faults: Faults) -> None:
         """Replace the faults; ``Faults()`` clears them all."""
         was_inside = not self.faults.outside_fence
-        self._outbox.faults = faults
+        self.outbox.faults = faults
         if faults.outside_fence and was_inside:
             self._flight.leave_fence()
 
@@ -200,11 +181,10 @@ class Autopilot:
         self._start(now + REBOOT_TIME)
 
     def _is_for_us(self, message: Message) -> bool:
-        target = getattr(message, "target_system", BROADCAST)
-        component = getattr(message, "target_component", BROADCAST)
+        target = target_of(message)
         if not self._persona.heeds_component:
-            component = BROADCAST
-        return Address(target, component).reaches(self.address)
+            target = target._replace(component_id=BROADCAST)
+        return target.reaches(self.address)
 
     def _seen(self, truth: BodyState) -> BodyState:
         return truth if self._estimator is None else self._estimator.see(truth, asked=self._asked)
@@ -222,23 +202,7 @@ class Autopilot:
         self._drive = drive(on)
         self._home_told = self._flight.home
         self._telemetry = Telemetry(on, self._flight, unix_offset=self._unix_offset)
-        restart = lambda: self.reboot(now=on.now)  # noqa: E731
-        self._commands = Commands(on, self._flight, self._send, restart)
-        self._handlers: Mapping[int, Callable[[Any, Address], None]] = {
-            **on.missions.handlers,
-            **on.parameters.handlers,
-            m.CommandLong.id: self._handle_command,
-            m.CommandInt.id: self._handle_command,
-            m.SetMode.id: self._handle_set_mode,
-            m.Heartbeat.id: lambda _, sender: self._flight.hear_heartbeat(sender.system_id),
-            m.SetPositionTargetLocalNed.id: lambda message, _: self._flight.take(message),
-            m.SetPositionTargetGlobalInt.id: lambda message, _: self._flight.take(message),
-            m.RequestDataStream.id: self._handle_request_data_stream,
-            m.MissionSetCurrent.id: self._handle_mission_set_current,
-            m.Timesync.id: self._handle_timesync,
-            m.RcChannelsOverride.id: lambda message, _: on.sticks.take_override(message),
-            m.FileTransferProtocol.id: self._handle_file_transfer,
-        }
+        self._commands = Commands(on, self._flight, self._send, self._restart)
 
     def _send(self, message_id: int) -> bool:
         on = self._on
@@ -279,6 +243,9 @@ class Autopilot:
             self._runtime_due += RUNTIME_INTERVAL
             parameters.change(name, parameters[name] + RUNTIME_INTERVAL)
 
+    def _restart(self) -> None:
+        self.reboot(now=self._on.now)
+
     def _go_to_item(self, place: Destination) -> bool:
         flight = self._flight
         return flight.can_reposition and flight.reposition(place)
@@ -288,33 +255,56 @@ class Autopilot:
         if self._flight.take_changes() & self._on.realism.timing.announces:
             self._send(m.Heartbeat.id)
 
-    def _handle_command(self, message: m.CommandLong | m.CommandInt, sender: Address) -> None:
-        result = self._commands.execute(message.command, read_command(message))
+    # the method for a message has its name; missions and parameters have theirs
+
+    def on_command_long(self, message: m.CommandLong | m.CommandInt, sender: Address) -> None:
+        """Execute a command."""
+        result = self._commands.execute(message)
         if result is not None:
             self._ack(message.command, result, sender)
 
-    def _handle_set_mode(self, message: m.SetMode, sender: Address) -> None:
+    on_command_int = on_command_long
+
+    def on_set_mode(self, message: m.SetMode, sender: Address) -> None:
         """Answer the deprecated message SET_MODE with a COMMAND_ACK, as autopilots do."""
         result = self._commands.set_mode(message.base_mode, message.custom_mode)
         self._ack(self._persona.set_mode_acked_as, result, sender)
 
     def _ack(self, command: int, result: MavResult, sender: Address) -> None:
         at = self._departures.answer_at(self._on.now)
-        self._outbox.send_at(m.CommandAck(command, result, 0, 0, *sender), at, self._on.now)
+        self.outbox.send_at(m.CommandAck(command, result, 0, 0, *sender), at, self._on.now)
 
-    def _handle_request_data_stream(self, message: m.RequestDataStream, _sender: Address) -> None:
+    def on_heartbeat(self, _message: m.Heartbeat, sender: Address) -> None:
+        """Note a heartbeat from any system."""
+        self._flight.hear_heartbeat(sender.system_id)
+
+    def on_set_position_target_local_ned(self, message: Local | Global, _sender: Address) -> None:
+        """Take a setpoint."""
+        self._flight.take(message)
+
+    on_set_position_target_global_int = on_set_position_target_local_ned
+
+    def on_rc_channels_override(self, message: m.RcChannelsOverride, _sender: Address) -> None:
+        """Take the sticks of a client."""
+        self._on.sticks.take_override(message)
+
+    def on_request_data_stream(self, message: m.RequestDataStream, _sender: Address) -> None:
+        """Set the rate of a group of messages."""
         rate = message.req_message_rate if message.start_stop else 0
         self._on.streams.set_group(message.req_stream_id, rate, self._on.now)
 
-    def _handle_mission_set_current(self, message: m.MissionSetCurrent, _sender: Address) -> None:
+    def on_mission_set_current(self, message: m.MissionSetCurrent, _sender: Address) -> None:
+        """Continue with another mission item."""
         if not self._flight.skip_to_item(message.seq):
-            self._outbox.say(MavSeverity.CRITICAL, "WPM: WP CURR CMD: Not in list")
+            self.outbox.say(MavSeverity.CRITICAL, "WPM: WP CURR CMD: Not in list")
         self._send(m.MissionCurrent.id)
 
-    def _handle_timesync(self, message: m.Timesync, _sender: Address) -> None:
-        if message.tc1 == 0:  # 0 marks a request; other values are responses
+    def on_timesync(self, message: m.Timesync, _sender: Address) -> None:
+        """Answer a request for the time since boot; tc1 is 0 in requests only."""
+        if message.tc1 == 0:
             boot_ns = int((self._on.now - self._on.started) * 1e9)
-            self._outbox.send(m.Timesync(boot_ns, message.ts1))
+            self.outbox.send(m.Timesync(boot_ns, message.ts1))
 
-    def _handle_file_transfer(self, message: m.FileTransferProtocol, sender: Address) -> None:
-        self._outbox.send(m.FileTransferProtocol(0, *sender, refusal_of(message.payload)))
+    def on_file_transfer_protocol(self, message: m.FileTransferProtocol, sender: Address) -> None:
+        """Refuse a file: without an answer a client would wait for seconds."""
+        self.outbox.send(m.FileTransferProtocol(0, *sender, refusal_of(message.payload)))

@@ -20,7 +20,7 @@ from random import Random
 from typing import Any
 
 from rover_sim.body import BodyState, Pose, wrap_angle
-from rover_sim.bullet_wheels import SkidWheels, SteeredWheels, Wheels
+from rover_sim.bullet_wheels import Wheels
 from rover_sim.errors import MissingExtra
 from rover_sim.frames import Frame
 
@@ -71,9 +71,13 @@ class BulletBody:
         skids = frame.turns_on_the_spot
         urdf = ASSETS / ("rover.urdf" if skids else "ackermann.urdf")
         self._rover = self._build(start, urdf)
-        wheels = SkidWheels if skids else SteeredWheels
-        self._wheels: Wheels = wheels(self._p, self._client, self._rover)
-        self._spread(_wheel_frictions(friction, variation, seed))
+        self._wheels = Wheels(self._p, self._client, self._rover, steered=not skids)
+        for axle, own in zip(
+            self._wheels.axles, _wheel_frictions(friction, variation, seed), strict=True
+        ):
+            self._p.changeDynamics(
+                self._rover, axle, lateralFriction=own, physicsClientId=self._client
+            )
         self.advance(SETTLING)
         self._time = 0.0
 
@@ -162,12 +166,6 @@ class BulletBody:
         # Set damping only on the base: set for a wheel, pybullet 3.2.7 drops the wheel's friction.
         p.changeDynamics(rover, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
         return rover
-
-    def _spread(self, frictions: list[float]) -> None:
-        for joint, friction in zip(self._wheels.joints, frictions, strict=True):
-            self._p.changeDynamics(
-                self._rover, joint, lateralFriction=friction, physicsClientId=self._client
-            )
 
 
 def _wheel_frictions(friction: float, variation: float, seed: int | None) -> list[float]:

@@ -8,7 +8,6 @@ table ``commands`` names the method of ``Commands`` for each command, or its fix
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavModeFlag, MavResult, MavSeverity
@@ -28,13 +27,7 @@ DRIVEN = 1.0, 3.0  # channels of steering and throttle
 CHANNELS = 16
 
 
-class Command(NamedTuple):
-    """The fields of COMMAND_LONG or COMMAND_INT that the actions need."""
-
-    params: tuple[float, float, float, float]
-    place: tuple[float, float] | None  # degE7, unchecked; None if not given
-    frame: int | None  # None from COMMAND_LONG
-    altitude: float  # param7, z of COMMAND_INT
+Command = messages.CommandLong | messages.CommandInt
 
 
 class Commands:
@@ -54,9 +47,9 @@ class Commands:
         self._send = send
         self._results = on.persona.results
 
-    def execute(self, number: int, command: Command) -> MavResult | None:
-        """Execute a command by its MAV_CMD."""
-        action = self._on.persona.commands.get(number, UNSUPPORTED.name)
+    def execute(self, command: Command) -> MavResult | None:
+        """Execute a command."""
+        action = self._on.persona.commands.get(command.command, UNSUPPORTED.name)
         if action in MavResult.__members__:
             return MavResult[action]
         result: MavResult | None = getattr(self, action)(command)
@@ -76,7 +69,7 @@ class Commands:
 
     def arm_disarm(self, command: Command) -> MavResult:
         """Arm or disarm; a ground vehicle can be disarmed at any time."""
-        arm, force = command.params[:2]
+        arm, force = command.param1, command.param2
         if arm == 1.0:
             return self._done(self._flight.arm(forced=force in self._on.persona.force_arm))
         if arm != 0.0:
@@ -86,14 +79,14 @@ class Commands:
 
     def set_custom_mode(self, command: Command) -> MavResult:
         """Change the mode; param2 is HEARTBEAT.custom_mode."""
-        base_mode, custom_mode = command.params[:2]
+        base_mode, custom_mode = command.param1, command.param2
         if not (0 <= base_mode <= 255 and 0 <= custom_mode <= 0xFFFFFFFF):  # NaN fails, too
             return DENIED
         return self.set_mode(int(base_mode), int(custom_mode))
 
     def set_main_mode(self, command: Command) -> MavResult:
         """Change the mode; param2 is the main mode, param3 the sub mode."""
-        base_mode, main, sub = command.params[:3]
+        base_mode, main, sub = command.param1, command.param2, command.param3
         sub = 0.0 if math.isnan(sub) else sub
         if not all(0 <= value <= 255 for value in (base_mode, main, sub)):  # NaN fails, too
             return DENIED
@@ -103,7 +96,7 @@ class Commands:
 
     def set_standard_mode(self, command: Command) -> MavResult:
         """Change to a MAV_STANDARD_MODE."""
-        number = as_id(command.params[0])
+        number = as_id(command.param1)
         offered = self._on.persona.offered_modes if number else ()
         mode = next((each.mode for each in offered if each.standard == number), None)
         return MavResult.FAILED if mode is None else self._done(self._flight.request_mode(mode))
@@ -119,13 +112,13 @@ class Commands:
 
     def start_auto(self, command: Command) -> MavResult:
         """Enter AUTO; deny any first and last item but 0."""
-        if command.params[:2] != (0.0, 0.0):
+        if command.param1 != 0.0 or command.param2 != 0.0:
             return DENIED
         return self._done(self._flight.request_mode(Mode.AUTO))
 
     def start_mission(self, command: Command) -> MavResult:
         """Enter MISSION at an item (-1: the present one), and arm."""
-        first, missions = command.params[0], self._on.missions
+        first, missions = command.param1, self._on.missions
         if missions.route() is None:
             text = "Mission start denied! No valid mission"
             self._on.outbox.say(MavSeverity.CRITICAL, text)
@@ -139,13 +132,12 @@ class Commands:
 
     def go_to(self, command: Command) -> MavResult:
         """Drive to a place in GUIDED; accept COMMAND_INT only."""
-        if command.frame is None or command.place is None:
+        if not isinstance(command, messages.CommandInt):
             return UNSUPPORTED
-        x, y = command.place
-        place = read_place(int(x), int(y), self._on.origin)
+        place = read_place(command.x, command.y, self._on.origin)
         if command.frame not in GLOBAL_FRAMES or place is None:
             return DENIED
-        if not self._flight.can_reposition and command.params[1] != CHANGE_MODE:
+        if not self._flight.can_reposition and command.param2 != CHANGE_MODE:
             return DENIED
         return self._done(self._flight.reposition(place))
 
@@ -156,35 +148,36 @@ class Commands:
         the navigator of 1.17 keeps its present destination (navigator_main.cpp, DO_REPOSITION).
         Without CHANGE_MODE the commander answers UNSUPPORTED, but the navigator obeys.
         """
-        changes_mode, flight = command.params[1] == CHANGE_MODE, self._flight
+        changes_mode, flight = command.param2 == CHANGE_MODE, self._flight
         if not changes_mode and not (flight.can_reposition and flight.armed):
             return UNSUPPORTED
-        is_int = command.frame is not None
-        if command.place is None or (is_int and command.place == (NOT_GIVEN, NOT_GIVEN)):
-            keeps = any(map(math.isfinite, (command.params[3], command.altitude)))
+        place = place_of(command)
+        altitude = command.param7 if isinstance(command, messages.CommandLong) else command.z
+        if place is None:
+            keeps = math.isfinite(command.param4) or math.isfinite(altitude)
             done = flight.reposition(None, keeps_place=keeps)
             return self._done(done) if changes_mode else UNSUPPORTED
-        if not is_on_earth(*command.place):
+        if not is_on_earth(*place):
             return DENIED
-        latitude, longitude = map(round, command.place)
+        latitude, longitude = map(round, place)
         done = flight.reposition(Destination(*self._on.origin.to_local(latitude, longitude)))
         return self._done(done) if changes_mode else UNSUPPORTED
 
     def change_speed(self, command: Command) -> MavResult:
         """Change the speed of the modes that drive by themselves."""
-        changed = self._flight.change_speed(command.params[1])
+        changed = self._flight.change_speed(command.param2)
         return ACCEPTED if changed else self._results["bad_speed"]
 
     def set_mission_current(self, command: Command) -> MavResult:
         """Continue with another mission item."""
-        seq = command.params[0]
+        seq = command.param1
         if not 0 <= seq <= 65535 or not self._flight.skip_to_item(int(seq)):
             return DENIED
         return ACCEPTED
 
     def reboot_shutdown(self, command: Command) -> MavResult:
         """Restart; refuse while armed."""
-        what = command.params[0]
+        what = command.param1
         if what not in (REBOOT, REBOOT_TO_BOOTLOADER):
             return self._results["reboot_nothing" if what == NOTHING else "reboot_other"]
         if self._flight.armed:
@@ -197,9 +190,9 @@ class Commands:
 
         The altitude is ignored: the world is flat.
         """
-        given, takes_zeros = command.place, self._on.persona.home.nowhere_is_here
+        given, takes_zeros = place_of(command), self._on.persona.home.nowhere_is_here
         x, y = map(round, given) if given and is_on_earth(*given) else (NOT_GIVEN, NOT_GIVEN)
-        if command.params[0] == HERE or (takes_zeros and x == y == 0):
+        if command.param1 == HERE or (takes_zeros and x == y == 0):
             self._flight.set_home(None)
             return ACCEPTED
         place = read_place(x, y, self._on.origin)
@@ -212,7 +205,7 @@ class Commands:
 
     def set_message_interval(self, command: Command) -> MavResult:
         """Change the interval of a message."""
-        message_id, interval_us = as_id(command.params[0]), command.params[1]
+        message_id, interval_us = as_id(command.param1), command.param2
         if self._on.streams.set_interval(message_id, interval_us, self._on.now):
             return ACCEPTED
         text = self._on.persona.texts["bad_interval"]
@@ -221,7 +214,7 @@ class Commands:
 
     def get_message_interval(self, command: Command) -> MavResult:
         """Send MESSAGE_INTERVAL of the message in param1."""
-        return self._tell_interval(command.params[0], MavResult.FAILED)
+        return self._tell_interval(command.param1, MavResult.FAILED)
 
     def _tell_interval(self, value: float, refusal: MavResult) -> MavResult:
         message_id = as_id(value)
@@ -233,15 +226,15 @@ class Commands:
 
     def request_message(self, command: Command) -> MavResult:
         """Send the message in param1, once."""
-        return self._told(as_id(command.params[0]))
+        return self._told(as_id(command.param1))
 
     def request_any_message(self, command: Command) -> MavResult:
         """Send the message in param1, also one that needs param2."""
-        match as_id(command.params[0]):
+        match as_id(command.param1):
             case messages.AvailableModes.id:
-                return self._tell_modes(as_id(command.params[1]))
+                return self._tell_modes(as_id(command.param2))
             case messages.MessageInterval.id:
-                return self._tell_interval(command.params[1], DENIED)
+                return self._tell_interval(command.param2, DENIED)
             case message_id:
                 return self._told(message_id)
 
@@ -284,11 +277,11 @@ class Commands:
 
     def set_relay(self, command: Command) -> MavResult:
         """Switch the only relay."""
-        return ACCEPTED if command.params[0] == 0.0 else MavResult.FAILED
+        return ACCEPTED if command.param1 == 0.0 else MavResult.FAILED
 
     def set_servo(self, command: Command) -> MavResult:
         """Set a servo output, unless it drives the rover."""
-        channel = command.params[0]
+        channel = command.param1
         if channel in DRIVEN:
             text = f"ServoRelayEvent: Channel {channel:.0f} is already in use"
             self._on.outbox.inform(text)
@@ -296,14 +289,13 @@ class Commands:
         return ACCEPTED if 1.0 <= channel <= CHANNELS else MavResult.FAILED
 
 
-def read_command(message: messages.CommandLong | messages.CommandInt) -> Command:
-    """Return the fields of a command, from either form."""
-    params = (message.param1, message.param2, message.param3, message.param4)
-    if isinstance(message, messages.CommandInt):
-        return Command(params, (message.x, message.y), message.frame, message.z)
-    degrees = (message.param5, message.param6)
-    place = None if any(map(math.isnan, degrees)) else (degrees[0] * 1e7, degrees[1] * 1e7)
-    return Command(params, place, None, message.param7)
+def place_of(command: Command) -> tuple[float, float] | None:
+    """Return latitude and longitude in degE7, unchecked; None if not given."""
+    if isinstance(command, messages.CommandInt):
+        is_given = (command.x, command.y) != (NOT_GIVEN, NOT_GIVEN)
+        return (command.x, command.y) if is_given else None
+    degrees = (command.param5, command.param6)
+    return None if any(map(math.isnan, degrees)) else (degrees[0] * 1e7, degrees[1] * 1e7)
 
 
 def as_id(value: float) -> int:

@@ -19,9 +19,6 @@ class BodyByHand:
         self._frame = frame
         self.blocked: frozenset[Actuator] = frozenset()  # sides with blocked wheels
 
-    def __repr__(self) -> str:
-        return f"BodyByHand({self._body!r})"
-
     @property
     def lag(self) -> float:
         """Delay of the wheels behind ``drive``, s."""

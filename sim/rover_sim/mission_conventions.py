@@ -26,7 +26,7 @@ class MissionConventions:
     goes_on: bool  # AUTO resumes the mission instead of restarting it
     takes_guided_items: bool  # a lone item with current = 2 is a place to drive to now, in GUIDED
     timeout_result: MavMissionResult | None = None  # the ack that ends an upload; None: silence
-    full_text: str | None = None
+    full_text: str = ""
     wrong_sequence: MavMissionResult | None = None  # to an unrequested item; None: silence
 
     @property

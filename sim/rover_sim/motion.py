@@ -27,9 +27,6 @@ class YawControl:
         self.yaw_rate = 0.0  # rad/s, the ramped demand
         self._correction = 0.0
 
-    def __repr__(self) -> str:
-        return f"YawControl({self.yaw_rate:.2f} rad/s)"
-
     def step(self, demanded: float, measured: float, *, rolls: bool) -> float:
         """Return the yaw rate for the wheels, for one control period."""
         limits = self._limits

@@ -20,9 +20,6 @@ class Motors:
         self._part = 1.0 - math.exp(-CONTROL_PERIOD / missing) if missing > 0.0 else 1.0
         self._motion: Motion = (0.0, 0.0)
 
-    def __repr__(self) -> str:
-        return f"Motors({self._motion})"
-
     def step(self, asked: Motion) -> Motion:
         """Return the motion of the wheels in this control period."""
         self._motion = (

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from rover_sim.outbox import Outbox
 
 if TYPE_CHECKING:
-    from mav_tasks.mavlink.address import Address
     from rover_sim.boot import Boot
     from rover_sim.estimate import Estimate
     from rover_sim.geo import Origin
@@ -29,7 +28,7 @@ class Onboard:
     persona: Persona
     realism: Realism
     origin: Origin
-    address: Address
+    uid: int  # distinguishes simulated rovers
     estimate: Estimate
     now: float
     outbox: Outbox = field(default_factory=Outbox)

@@ -5,10 +5,8 @@ autopilots.
 """
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from struct import pack, unpack
-from typing import Any
 from zlib import crc32
 
 from mav_tasks.mavlink import messages
@@ -53,11 +51,6 @@ class Parameters:
         self._indices = {each.name: index for index, each in enumerate(self._listed)}
         self._values = {each.name: each.value for each in self._listed}
         self._outbox = outbox
-        self.handlers: Mapping[int, Callable[[Any, Address], None]] = {
-            messages.ParamRequestList.id: self._handle_request_list,
-            messages.ParamRequestRead.id: self._handle_request_read,
-            messages.ParamSet.id: self._handle_set,
-        }
 
     def __contains__(self, name: str) -> bool:
         return name in self._values
@@ -75,12 +68,12 @@ class Parameters:
         self[name] = value
         self._send(self._indices[name], UNNUMBERED)
 
-    def _handle_request_list(self, _message: messages.ParamRequestList, _sender: Address) -> None:
+    def on_param_request_list(self, _message: messages.ParamRequestList, _sender: Address) -> None:
         self._send_hash()  # PX4 sends its hash first (mavlink_parameters.cpp)
         for index in range(len(self._listed)):
             self._send(index, index)
 
-    def _handle_request_read(self, message: messages.ParamRequestRead, _sender: Address) -> None:
+    def on_param_request_read(self, message: messages.ParamRequestRead, _sender: Address) -> None:
         index, name = message.param_index, _name_of(message.param_id)
         if 0 <= index < len(self._listed):
             self._send(index, index)
@@ -89,7 +82,7 @@ class Parameters:
         elif index == BY_NAME and name in self._indices:
             self._answer(self._indices[name])
 
-    def _handle_set(self, message: messages.ParamSet, _sender: Address) -> None:
+    def on_param_set(self, message: messages.ParamSet, _sender: Address) -> None:
         """Answer with the stored value, even if it is unchanged."""
         index = self._indices.get(_name_of(message.param_id))
         if index is None:

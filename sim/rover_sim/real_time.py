@@ -14,31 +14,10 @@ DATAGRAMS_PER_TURN = 64  # then the rovers get their turn
 TRUTH_INTERVAL = 0.1  # s
 
 
-class Clock:
-    """Simulated time: the monotonic clock, scaled from its start."""
-
-    def __init__(self, speed: float) -> None:
-        self._speed = speed
-        self._start = time.monotonic()
-
-    def now(self) -> float:
-        """Return simulated seconds; at real speed they equal the monotonic clock."""
-        return self._start + (time.monotonic() - self._start) * self._speed
-
-    def elapsed(self, now: float) -> float:
-        """Return simulated seconds since the start."""
-        return now - self._start
-
-    def real(self, duration: float) -> float:
-        """Return the real seconds that a simulated duration takes."""
-        return duration / self._speed
-
-
 def drive(
     server: socket.socket,
     stop: socket.socket,
     vehicles: list[Vehicle],
-    clock: Clock,
     truth: TextIO | None,
     faults: FaultPlayer,
 ) -> None:
@@ -46,28 +25,28 @@ def drive(
     selector = selectors.DefaultSelector()
     selector.register(server, selectors.EVENT_READ)
     selector.register(stop, selectors.EVENT_READ)
-    truth_due = clock.now()
+    start = truth_due = time.monotonic()
     with selector:
         while True:
             deadline = min(vehicle.next_deadline() for vehicle in vehicles)
-            ready = selector.select(max(0.0, clock.real(deadline - clock.now())))
+            ready = selector.select(max(0.0, deadline - time.monotonic()))
             if any(key.fileobj is stop for key, _ in ready):
                 return
             if ready:
-                _read(server, vehicles, clock)
-            now = clock.now()
-            for line in faults.play(clock.elapsed(now), now=now):
+                _read(server, vehicles)
+            now = time.monotonic()
+            for line in faults.play(now - start, now=now):
                 sys.stdout.write(f"rover_sim: {line}\n")
                 sys.stdout.flush()
             for vehicle in vehicles:
                 vehicle.handle_deadline(now=now)
                 _send(server, vehicle)
             if truth is not None and now >= truth_due:
-                _write_truth(truth, vehicles, clock.elapsed(now))
+                _write_truth(truth, vehicles, now - start)
                 truth_due = max(truth_due + TRUTH_INTERVAL, now)
 
 
-def _read(server: socket.socket, vehicles: list[Vehicle], clock: Clock) -> None:
+def _read(server: socket.socket, vehicles: list[Vehicle]) -> None:
     for _ in range(DATAGRAMS_PER_TURN):
         try:
             data, peer = server.recvfrom(MAX_DATAGRAM)
@@ -75,7 +54,7 @@ def _read(server: socket.socket, vehicles: list[Vehicle], clock: Clock) -> None:
             return
         except OSError:  # an earlier datagram met a closed port: that peer will time out
             continue
-        now = clock.now()
+        now = time.monotonic()
         for vehicle in vehicles:
             vehicle.receive(data, peer, now=now)
 

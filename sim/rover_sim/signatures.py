@@ -31,9 +31,6 @@ class RoverSignatures:
         self._times = StreamTimes()
         self.refused = 0
 
-    def __repr__(self) -> str:
-        return f"RoverSignatures({self._key.name}, {self.refused} refused)"
-
     def sealed(self, raw: bytes, *, now: float) -> bytes:
         """Return a packet signed."""
         return self._signer.sign(raw, clock=self._clock(now))

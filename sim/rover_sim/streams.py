@@ -3,7 +3,7 @@
 MAVLink guide, "Message Interval"; REQUEST_DATA_STREAM sets the same intervals by group.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 OFF = 0.0
@@ -34,9 +34,6 @@ class Streams:
         }
         self._next = now  # least of _due: most control steps check nothing else
 
-    def __repr__(self) -> str:
-        return f"Streams(next={self._next:.3f})"
-
     def interval_us(self, message_id: int) -> int:
         """Return the interval for MESSAGE_INTERVAL: -1 off, 0 not available."""
         interval = self._intervals.get(message_id)
@@ -48,24 +45,23 @@ class Streams:
         """Set the interval in µs; 0 is the default, -1 off. Return False if refused."""
         if message_id not in self._intervals:
             return False
+        interval = interval_us * 1e-6
         if interval_us == 0:
-            self._set(message_id, self._table.intervals[message_id], now)
+            interval = self._table.intervals[message_id]
         elif interval_us == -1:
-            self._set(message_id, OFF, now)
-        elif not interval_us * 1e-6 >= self._table.shortest_interval:  # NaN fails, too
+            interval = OFF
+        elif not interval >= self._table.shortest_interval:  # NaN fails, too
             return False
-        else:
-            self._set(message_id, interval_us * 1e-6, now)
+        self._set(message_id, interval, now)
         return True
 
     def set_group(self, group: int, rate: float, now: float) -> None:
         """Set a whole group's rate in Hz; 0 switches it off."""
-        members: Iterable[int] = self._table.groups.get(group, ())
-        if group == ALL_STREAMS:
-            members = (message_id for ids in self._table.groups.values() for message_id in ids)
         interval = max(1.0 / rate, self._table.shortest_interval) if rate > 0 else OFF
-        for message_id in members:
-            self._set(message_id, interval, now)
+        for number, members in self._table.groups.items():
+            if group in (number, ALL_STREAMS):
+                for message_id in members:
+                    self._set(message_id, interval, now)
 
     def take_due(self, now: float) -> list[int]:
         """Return the ids that are due, and set the next due time of each."""

@@ -28,56 +28,61 @@ TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_*
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 NONE, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = range(1, 6)  # MISSION_STATE
 NOTHING = (0,) * 8
+SENT: tuple[type[Message], ...] = (
+    m.Heartbeat,
+    m.SysStatus,
+    m.SystemTime,
+    m.GpsRawInt,
+    m.Attitude,
+    m.LocalPositionNed,
+    m.GlobalPositionInt,
+    m.MissionCurrent,
+    m.GpsGlobalOrigin,
+    m.VfrHud,
+    m.PositionTargetGlobalInt,
+    m.BatteryStatus,
+    m.AutopilotVersion,
+    m.HomePosition,
+    m.ExtendedSysState,
+    m.ProtocolVersion,
+    m.CurrentMode,
+    m.RcChannels,
+)
+Builder = Callable[[Estimate, int], Message | None]
 
 
 class Telemetry:
-    """Builds every message that the rover can send about itself, by message id."""
+    """Builds every message that the rover can send about itself.
+
+    The method for a message has its name; it takes the estimate, and the milliseconds since boot.
+    """
 
     def __init__(self, on: Onboard, flight: Flight, *, unix_offset: float) -> None:
         self._on = on
         self._flight = flight
         self._unix_offset = unix_offset
-        self._builders: Mapping[int, Callable[[Estimate, int], Message | None]] = {
-            m.Heartbeat.id: self._heartbeat,
-            m.SysStatus.id: self._sys_status,
-            m.SystemTime.id: self._system_time,
-            m.GpsRawInt.id: self._gps_raw_int,
-            m.Attitude.id: self._attitude,
-            m.LocalPositionNed.id: self._local_position_ned,
-            m.GlobalPositionInt.id: self._global_position_int,
-            m.MissionCurrent.id: self._mission_current,
-            m.GpsGlobalOrigin.id: self._gps_global_origin,
-            m.VfrHud.id: self._vfr_hud,
-            m.PositionTargetGlobalInt.id: self._position_target_global_int,
-            m.BatteryStatus.id: lambda *_: m.BatteryStatus(
-                0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100
-            ),
-            m.AutopilotVersion.id: self._autopilot_version,
-            m.HomePosition.id: self._home_position,
-            m.ExtendedSysState.id: self._extended_sys_state,
-            m.ProtocolVersion.id: lambda *_: m.ProtocolVersion(  # MAVLink 2, minimum 1
-                200, 100, 200, NOTHING, NOTHING
-            ),
-            m.CurrentMode.id: self._current_mode,
-            m.RcChannels.id: self._rc_channels,
-            **dict.fromkeys(on.persona.accepted_in_silence, lambda *_: None),
+        self._builders: Mapping[int, Builder] = {
+            each.id: getattr(self, f"_{each.msgname.lower()}")
+            for each in SENT
+            if each.id not in on.persona.lacks
         }
 
     def knows(self, message_id: int) -> bool:
         """Return whether this rover can send the message."""
-        return message_id in self._builders and message_id not in self._on.persona.lacks
+        return message_id in self._builders or message_id in self._on.persona.accepted_in_silence
 
     def build(self, message_id: int, estimate: Estimate, now: float) -> Message | None:
         """Return the present message; None if there is nothing to send."""
         boot_ms = int((now - self._on.started) * 1000.0 + 0.5)
-        message = self._builders[message_id](estimate, boot_ms)
+        build = self._builders.get(message_id)
+        message = None if build is None else build(estimate, boot_ms)
         if message is not None and hasattr(message, "time_boot_ms"):
             if not self._on.boot.tells_its_time(now):
                 return None
             message.time_boot_ms %= OVERFLOW
         return message
 
-    def _heartbeat(self, _estimate: Estimate, _boot_ms: int) -> Message:
+    def _heartbeat(self, *_: object) -> Message:
         flight, persona = self._flight, self._on.persona
         armed = MavModeFlag.SAFETY_ARMED if flight.armed else 0
         return m.Heartbeat(
@@ -102,7 +107,7 @@ class Telemetry:
             present, enabled, healthy, 100, 12600, 500, faults.battery, 0, 0, 0, 0, 0, 0
         )  # load 10 %, 12.6 V, 5 A
 
-    def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:
+    def _extended_sys_state(self, *_: object) -> Message:
         armed, disarmed = self._on.persona.landed_states
         return m.ExtendedSysState(0, armed if self._flight.armed else disarmed)
 
@@ -183,7 +188,13 @@ class Telemetry:
         """Return the time that the message says."""
         return self._on.started + boot_ms * 1e-3
 
-    def _autopilot_version(self, _estimate: Estimate, _boot_ms: int) -> Message:
+    def _battery_status(self, *_: object) -> Message:
+        return m.BatteryStatus(0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100)
+
+    def _protocol_version(self, *_: object) -> Message:
+        return m.ProtocolVersion(200, 100, 200, NOTHING, NOTHING)  # MAVLink 2, minimum 1
+
+    def _autopilot_version(self, *_: object) -> Message:
         persona = self._on.persona
         return m.AutopilotVersion(
             persona.capabilities,
@@ -193,10 +204,10 @@ class Telemetry:
             NOTHING,
             NOTHING,
             *(0, 0),
-            self._on.address.system_id,  # uid: distinguishes simulated rovers
+            self._on.uid,
         )
 
-    def _mission_current(self, _estimate: Estimate, _boot_ms: int) -> Message:
+    def _mission_current(self, *_: object) -> Message:
         flight, missions = self._flight, self._on.missions
         total = missions.item_count
         if total == 0:
@@ -226,7 +237,7 @@ class Telemetry:
             boot_ms, 5, TARGET_POSITION_ONLY, *place, origin.altitude, *NOTHING
         )
 
-    def _current_mode(self, _estimate: Estimate, _boot_ms: int) -> Message:
+    def _current_mode(self, *_: object) -> Message:
         flight, persona = self._flight, self._on.persona
         offered, numbers = persona.offered_modes, persona.modes.numbers
         standard = next((each.standard for each in offered if each.mode is flight.mode), 0)
