@@ -82,6 +82,7 @@ class Autopilot:
         self.missions = on.missions = MissionStorage(on, self._go_to_item)
         on.sticks = Sticks(on)
         self._home_told: Destination
+        self._shown_mode: Mode
         self._clock_stopped_at = now  # time of the last step with a running clock
         self.boots = 0  #: number of restarts
         self._start(now)
@@ -116,7 +117,7 @@ class Autopilot:
         self._watch_satellites()
         demand = self._flight.demand()
         if self._flight.home != self._home_told:
-            self._home_told = self._flight.home
+            self._home_told, self._shown_mode = self._flight.home, self.mode
             if self._persona.home.is_told:
                 self._send(m.HomePosition.id)
         on.missions.step()
@@ -167,8 +168,7 @@ class Autopilot:
         self._announce()
 
     def operator_sticks(self, forward_speed: float, yaw_rate: float) -> None:
-        """Hold the sticks (m/s, rad/s) until the mode changes; for MANUAL and POSITION."""
-        self._flight.set_sticks(forward_speed, yaw_rate)
+        """Hold the transmitter's sticks at this demand, m/s and rad/s."""
         self._on.sticks.hold(forward_speed, yaw_rate)
 
     def operator_pulses(self, throttle: int, steering: int) -> None:
@@ -200,7 +200,7 @@ class Autopilot:
         fly, drive = STACKS[persona.stack]
         self._flight = fly(on)
         self._drive = drive(on)
-        self._home_told = self._flight.home
+        self._home_told, self._shown_mode = self._flight.home, self.mode
         self._telemetry = Telemetry(on, self._flight, unix_offset=self._unix_offset)
         self._commands = Commands(on, self._flight, self._send, self._restart)
 
@@ -229,11 +229,8 @@ class Autopilot:
             return
         if self._gps_lost_at is None:
             self._gps_lost_at = on.now
-        had_position, self._is_position_gone = (
-            not self._is_position_gone,
-            on.now - self._gps_lost_at >= COASTS,
-        )
-        if had_position and self._is_position_gone:
+        if on.now - self._gps_lost_at >= COASTS and not self._is_position_gone:
+            self._is_position_gone = True
             self._flight.lose_position()
 
     def _count_runtime(self) -> None:
@@ -251,8 +248,9 @@ class Autopilot:
         return flight.can_reposition and flight.reposition(place)
 
     def _announce(self) -> None:
-        """Send a heartbeat at once if a change occurred that this autopilot announces."""
-        if self._flight.take_changes() & self._on.realism.timing.announces:
+        """Send a heartbeat at once if the mode changed, as some makes do."""
+        last, self._shown_mode = self._shown_mode, self.mode
+        if last is not self.mode and self._on.realism.timing.announces_mode:
             self._send(m.Heartbeat.id)
 
     # the method for a message has its name; missions and parameters have theirs

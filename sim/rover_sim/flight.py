@@ -10,7 +10,6 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavSeverity, MavState
 from rover_sim.modes import Mode
 from rover_sim.onboard import Onboard
-from rover_sim.realism import Change
 from rover_sim.route import Route, Waypoint, square_around
 from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
 from rover_sim.steering import COAST, STOP, Demand
@@ -32,14 +31,11 @@ class Flight:
         self.mode = self.intended = on.persona.modes.first
         self.armed = False
         self.setpoint: Target | None = None  # the last one in GUIDED
-        self.sticks_present = False  # a person holds the sticks of the RC transmitter
         self._here = self.home = Destination(on.estimate.north, on.estimate.east)
         self._home_is_set = False  # by a person
         self._home_looked_at = float("-inf")
         on.missions.complete = False
         self._route: Route | None = None
-        self._sticks = STOP
-        self._announced = (self.mode, self.armed)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.mode.name}, {'armed' if self.armed else 'disarmed'})"
@@ -70,13 +66,6 @@ class Flight:
     @property
     def _waypoint(self) -> Waypoint | None:
         return self._route.next if self._route is not None else None
-
-    def take_changes(self) -> Change:
-        """Return the changes since the last call."""
-        mode, armed = self._announced
-        self._announced = (self.mode, self.armed)
-        changed = Change.NOTHING if mode is self.mode else Change.MODE
-        return changed if armed is self.armed else changed | Change.ARMING
 
     # requests of clients
 
@@ -179,11 +168,6 @@ class Flight:
             self.choose(self.mode)
             self.on.outbox.inform(text or self._texts["armed" if armed else "disarmed"])
 
-    def set_sticks(self, speed: float, yaw_rate: float) -> None:
-        """Drive manually; has an effect only in MANUAL and POSITION."""
-        self._sticks = Demand(speed, yaw_rate)
-        self.sticks_present = True
-
     def lose_position(self) -> None:
         """End a mode that needs a position."""
         if self.armed and self.mode in NEEDS_POSITION:
@@ -205,7 +189,6 @@ class Flight:
             return
         self.mode = mode
         self._route = None
-        self._sticks = STOP
         self.begin(mode)
         missions = self.on.missions
         if mode is Mode.AUTO:
@@ -233,7 +216,7 @@ class Flight:
             case Mode.INITIALISING:
                 return COAST
             case Mode.MANUAL | Mode.POSITION:
-                demand = on.sticks.demand() or self._sticks
+                demand = on.sticks.demand()
             case Mode.HOLD | Mode.LAND:
                 demand = self.hold()
             case Mode.GUIDED:  # called also while disarmed, so that its time-out runs
@@ -246,7 +229,6 @@ class Flight:
 
     def _pass_time(self) -> None:
         on = self.on
-        self.sticks_present = self.sticks_present or on.sticks.is_there
         for text in on.boot.texts_due(on.now):
             on.outbox.inform(text)
         started = self.mode is Mode.INITIALISING and on.boot.is_initialised(on.now)

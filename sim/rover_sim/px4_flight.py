@@ -116,7 +116,7 @@ class Px4Flight(Flight):
     def _answer_loss(self) -> None:
         values, persona = self.on.parameters, self.on.persona
         action = persona.offboard_loss.get(int(values["COM_OBL_RC_ACT"]), Mode.POSITION.value)
-        if action in NEEDS_STICKS and not self.sticks_present:
+        if action in NEEDS_STICKS and not self.on.sticks.is_there:
             action = persona.stick_loss.get(int(values["NAV_RCL_ACT"]), "")
         if not action:
             return

@@ -5,15 +5,7 @@ of real autopilots (ArduPilot Rover 4.6.3, PX4 1.17.0, each on its own simulated
 """
 
 from dataclasses import dataclass, fields
-from enum import Enum, Flag, auto
-
-
-class Change(Flag):
-    """A change that triggers a HEARTBEAT before its second is over."""
-
-    NOTHING = 0
-    MODE = auto()
-    ARMING = auto()
+from enum import Enum
 
 
 class Gps(Enum):
@@ -89,7 +81,7 @@ class LinkTiming:
     first_answer: float  # s from a command to its COMMAND_ACK, least
     last_answer: float  # s, most
     in_pairs: bool  # late positions are sent two at a time
-    announces: Change  # changes that trigger a HEARTBEAT at once
+    announces_mode: bool  # a new mode triggers a HEARTBEAT before its second is over
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,14 +65,11 @@ class Sticks:
             self._override.clear()
         return tuple(self._override.get(n, held) for n, held in enumerate(self._held))
 
-    def demand(self) -> Demand | None:
-        """Return the sticks' demand in MANUAL; None if they are neutral."""
+    def demand(self) -> Demand:
+        """Return the sticks' demand in MANUAL."""
         channels = self.channels(self._on.now)
-        if channels == ALL_NEUTRAL:
-            return None
         speed = _part(channels[THROTTLE]) * self._top_speed
-        yaw_rate = _part(channels[STEERING]) * MAX_YAW_RATE
-        return None if speed == yaw_rate == 0.0 else Demand(speed, yaw_rate)
+        return Demand(speed, _part(channels[STEERING]) * MAX_YAW_RATE)
 
     def arming_refusal(self) -> str | None:
         """Return the text that refuses arming, in ArduPilot's words (4.6.3), or None."""
