@@ -265,7 +265,8 @@ class Autopilot:
 
     def on_set_mode(self, message: m.SetMode, sender: Address) -> None:
         """Answer the deprecated message SET_MODE with a COMMAND_ACK, as autopilots do."""
-        result = self._commands.set_mode(message.base_mode, message.custom_mode)
+        outcome = self._commands.set_mode(message.base_mode, message.custom_mode)
+        result = self._commands.result_of(outcome)
         self._ack(self._persona.set_mode_acked_as, result, sender)
 
     def _ack(self, command: int, result: MavResult, sender: Address) -> None:

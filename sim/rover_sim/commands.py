@@ -28,10 +28,11 @@ CHANNELS = 16
 
 
 Command = messages.CommandLong | messages.CommandInt
+Outcome = MavResult | bool
 
 
 class Commands:
-    """The actions; each takes a command and returns its result, or None for no answer."""
+    """The actions; each takes a command and returns its result, or whether it is done."""
 
     def __init__(
         self,
@@ -48,75 +49,76 @@ class Commands:
         self._results = on.persona.results
 
     def execute(self, command: Command) -> MavResult | None:
-        """Execute a command."""
+        """Execute a command; return None if it has no answer."""
         action = self._on.persona.commands.get(command.command, UNSUPPORTED.name)
+        if not action:
+            return None
         if action in MavResult.__members__:
             return MavResult[action]
-        result: MavResult | None = getattr(self, action)(command)
-        return result
+        return self.result_of(getattr(self, action)(command))
 
-    def set_mode(self, base_mode: int, custom_mode: int) -> MavResult:
+    def result_of(self, outcome: Outcome) -> MavResult:
+        """Return the result that an action means."""
+        if isinstance(outcome, MavResult):
+            return outcome
+        return ACCEPTED if outcome else self._results["not_done"]
+
+    def set_mode(self, base_mode: int, custom_mode: int) -> Outcome:
         """Change the mode from SET_MODE's fields."""
         if not base_mode & MavModeFlag.CUSTOM_MODE_ENABLED:
             return DENIED
-        return self._done(self._flight.request_custom_mode(custom_mode))
+        return self._flight.request_custom_mode(custom_mode)
 
-    def _done(self, success: bool) -> MavResult:
-        return ACCEPTED if success else self._results["not_done"]
-
-    def no_answer(self, _command: Command) -> None:
-        """Ignore a command without an answer."""
-
-    def arm_disarm(self, command: Command) -> MavResult:
+    def arm_disarm(self, command: Command) -> Outcome:
         """Arm or disarm; a ground vehicle can be disarmed at any time."""
         arm, force = command.param1, command.param2
         if arm == 1.0:
-            return self._done(self._flight.arm(forced=force in self._on.persona.force_arm))
+            return self._flight.arm(forced=force in self._on.persona.force_arm)
         if arm != 0.0:
             return UNSUPPORTED
         self._flight.set_armed(False)
-        return ACCEPTED
+        return True
 
-    def set_custom_mode(self, command: Command) -> MavResult:
+    def set_custom_mode(self, command: Command) -> Outcome:
         """Change the mode; param2 is HEARTBEAT.custom_mode."""
         base_mode, custom_mode = command.param1, command.param2
         if not (0 <= base_mode <= 255 and 0 <= custom_mode <= 0xFFFFFFFF):  # NaN fails, too
             return DENIED
         return self.set_mode(int(base_mode), int(custom_mode))
 
-    def set_main_mode(self, command: Command) -> MavResult:
+    def set_main_mode(self, command: Command) -> Outcome:
         """Change the mode; param2 is the main mode, param3 the sub mode."""
         base_mode, main, sub = command.param1, command.param2, command.param3
         sub = 0.0 if math.isnan(sub) else sub
         if not all(0 <= value <= 255 for value in (base_mode, main, sub)):  # NaN fails, too
             return DENIED
         if int(main) == AUTO and not sub:  # as its commander does
-            return self._done(self._flight.request_mode(Mode.AUTO))
+            return self._flight.request_mode(Mode.AUTO)
         return self.set_mode(int(base_mode), int(main) << 16 | int(sub) << 24)
 
-    def set_standard_mode(self, command: Command) -> MavResult:
+    def set_standard_mode(self, command: Command) -> Outcome:
         """Change to a MAV_STANDARD_MODE."""
         number = as_id(command.param1)
         offered = self._on.persona.offered_modes if number else ()
         mode = next((each.mode for each in offered if each.standard == number), None)
-        return MavResult.FAILED if mode is None else self._done(self._flight.request_mode(mode))
+        return MavResult.FAILED if mode is None else self._flight.request_mode(mode)
 
-    def return_to_launch(self, _command: Command) -> MavResult:
+    def return_to_launch(self, _command: Command) -> Outcome:
         """Enter RTL."""
-        return self._done(self._flight.request_mode(Mode.RTL))
+        return self._flight.request_mode(Mode.RTL)
 
-    def refuse_to_fly(self, _command: Command) -> MavResult:
+    def refuse_to_fly(self, _command: Command) -> Outcome:
         """Refuse takeoff and landing: a rover has no mode for them."""
         self._on.outbox.say(MavSeverity.CRITICAL, "A rover neither takes off nor lands")
         return MavResult.TEMPORARILY_REJECTED
 
-    def start_auto(self, command: Command) -> MavResult:
+    def start_auto(self, command: Command) -> Outcome:
         """Enter AUTO; deny any first and last item but 0."""
         if command.param1 != 0.0 or command.param2 != 0.0:
             return DENIED
-        return self._done(self._flight.request_mode(Mode.AUTO))
+        return self._flight.request_mode(Mode.AUTO)
 
-    def start_mission(self, command: Command) -> MavResult:
+    def start_mission(self, command: Command) -> Outcome:
         """Enter MISSION at an item (-1: the present one), and arm."""
         first, missions = command.param1, self._on.missions
         if missions.route() is None:
@@ -128,9 +130,9 @@ class Commands:
         if first >= 0:
             self._flight.skip_to_item(int(first))
         started = self._flight.request_mode(Mode.AUTO)
-        return self._done(started and self._flight.arm(forced=False))
+        return started and self._flight.arm(forced=False)
 
-    def go_to(self, command: Command) -> MavResult:
+    def go_to(self, command: Command) -> Outcome:
         """Drive to a place in GUIDED; accept COMMAND_INT only."""
         if not isinstance(command, messages.CommandInt):
             return UNSUPPORTED
@@ -139,9 +141,9 @@ class Commands:
             return DENIED
         if not self._flight.can_reposition and command.param2 != CHANGE_MODE:
             return DENIED
-        return self._done(self._flight.reposition(place))
+        return self._flight.reposition(place)
 
-    def reposition(self, command: Command) -> MavResult:
+    def reposition(self, command: Command) -> Outcome:
         """Drive to a place in HOLD, from either form of the command; without a place stay here.
 
         "Stay here" needs NaN in place, heading and altitude: with a number in heading or altitude,
@@ -156,26 +158,23 @@ class Commands:
         if place is None:
             keeps = math.isfinite(command.param4) or math.isfinite(altitude)
             done = flight.reposition(None, keeps_place=keeps)
-            return self._done(done) if changes_mode else UNSUPPORTED
+            return done if changes_mode else UNSUPPORTED
         if not is_on_earth(*place):
             return DENIED
         latitude, longitude = map(round, place)
         done = flight.reposition(Destination(*self._on.origin.to_local(latitude, longitude)))
-        return self._done(done) if changes_mode else UNSUPPORTED
+        return done if changes_mode else UNSUPPORTED
 
-    def change_speed(self, command: Command) -> MavResult:
+    def change_speed(self, command: Command) -> Outcome:
         """Change the speed of the modes that drive by themselves."""
-        changed = self._flight.change_speed(command.param2)
-        return ACCEPTED if changed else self._results["bad_speed"]
+        return self._flight.change_speed(command.param2) or self._results["bad_speed"]
 
-    def set_mission_current(self, command: Command) -> MavResult:
+    def set_mission_current(self, command: Command) -> Outcome:
         """Continue with another mission item."""
         seq = command.param1
-        if not 0 <= seq <= 65535 or not self._flight.skip_to_item(int(seq)):
-            return DENIED
-        return ACCEPTED
+        return (0 <= seq <= 65535 and self._flight.skip_to_item(int(seq))) or DENIED
 
-    def reboot_shutdown(self, command: Command) -> MavResult:
+    def reboot_shutdown(self, command: Command) -> Outcome:
         """Restart; refuse while armed."""
         what = command.param1
         if what not in (REBOOT, REBOOT_TO_BOOTLOADER):
@@ -183,9 +182,9 @@ class Commands:
         if self._flight.armed:
             return self._results["reboot_armed"]
         self._restart()
-        return ACCEPTED
+        return True
 
-    def set_home(self, command: Command) -> MavResult:
+    def set_home(self, command: Command) -> Outcome:
         """Set home to a place or to the rover's position. From the sources, not observed.
 
         The altitude is ignored: the world is flat.
@@ -194,41 +193,41 @@ class Commands:
         x, y = map(round, given) if given and is_on_earth(*given) else (NOT_GIVEN, NOT_GIVEN)
         if command.param1 == HERE or (takes_zeros and x == y == 0):
             self._flight.set_home(None)
-            return ACCEPTED
+            return True
         place = read_place(x, y, self._on.origin)
         if place is None:
             return self._results["bad_home"]
         self._flight.set_home(place)
-        return ACCEPTED
+        return True
 
     # messages on request
 
-    def set_message_interval(self, command: Command) -> MavResult:
+    def set_message_interval(self, command: Command) -> Outcome:
         """Change the interval of a message."""
         message_id, interval_us = as_id(command.param1), command.param2
         if self._on.streams.set_interval(message_id, interval_us, self._on.now):
-            return ACCEPTED
+            return True
         text = self._on.persona.texts["bad_interval"]
         self._on.outbox.inform(text.format(message_id))
         return self._results["bad_interval"]
 
-    def get_message_interval(self, command: Command) -> MavResult:
+    def get_message_interval(self, command: Command) -> Outcome:
         """Send MESSAGE_INTERVAL of the message in param1."""
         return self._tell_interval(command.param1, MavResult.FAILED)
 
-    def _tell_interval(self, value: float, refusal: MavResult) -> MavResult:
+    def _tell_interval(self, value: float, refusal: MavResult) -> Outcome:
         message_id = as_id(value)
         if message_id < 0:
             return refusal
         interval_us = self._on.streams.interval_us(message_id)
         self._on.outbox.send(messages.MessageInterval(message_id & 0xFFFF, interval_us))
-        return ACCEPTED
+        return True
 
-    def request_message(self, command: Command) -> MavResult:
+    def request_message(self, command: Command) -> Outcome:
         """Send the message in param1, once."""
         return self._told(as_id(command.param1))
 
-    def request_any_message(self, command: Command) -> MavResult:
+    def request_any_message(self, command: Command) -> Outcome:
         """Send the message in param1, also one that needs param2."""
         match as_id(command.param1):
             case messages.AvailableModes.id:
@@ -238,7 +237,7 @@ class Commands:
             case message_id:
                 return self._told(message_id)
 
-    def _tell_modes(self, index: int) -> MavResult:
+    def _tell_modes(self, index: int) -> Outcome:
         """Send AVAILABLE_MODES of an index, from 1; 0 sends all of them.
 
         MAVLink guide, "Standard Modes Protocol". The list never changes here, so there is no
@@ -256,37 +255,37 @@ class Commands:
                         len(offered), number, each.standard, mode, each.properties, name
                     )
                 )
-        return ACCEPTED
+        return True
 
-    def request_capabilities(self, _command: Command) -> MavResult:
+    def request_capabilities(self, _command: Command) -> Outcome:
         """Send AUTOPILOT_VERSION."""
         return self._told(messages.AutopilotVersion.id)
 
-    def request_protocol_version(self, _command: Command) -> MavResult:
+    def request_protocol_version(self, _command: Command) -> Outcome:
         """Send PROTOCOL_VERSION; without it QGroundControl falls back to MAVLink 1."""
         return self._told(messages.ProtocolVersion.id)
 
-    def get_home(self, _command: Command) -> MavResult:
+    def get_home(self, _command: Command) -> Outcome:
         """Send HOME_POSITION."""
         return self._told(messages.HomePosition.id)
 
-    def _told(self, message_id: int) -> MavResult:
-        return ACCEPTED if self._send(message_id) else self._results["unknown_message"]
+    def _told(self, message_id: int) -> Outcome:
+        return self._send(message_id) or self._results["unknown_message"]
 
     # outputs: one relay, and servos
 
-    def set_relay(self, command: Command) -> MavResult:
+    def set_relay(self, command: Command) -> Outcome:
         """Switch the only relay."""
-        return ACCEPTED if command.param1 == 0.0 else MavResult.FAILED
+        return command.param1 == 0.0
 
-    def set_servo(self, command: Command) -> MavResult:
+    def set_servo(self, command: Command) -> Outcome:
         """Set a servo output, unless it drives the rover."""
         channel = command.param1
         if channel in DRIVEN:
             text = f"ServoRelayEvent: Channel {channel:.0f} is already in use"
             self._on.outbox.inform(text)
-            return MavResult.FAILED
-        return ACCEPTED if 1.0 <= channel <= CHANNELS else MavResult.FAILED
+            return False
+        return 1.0 <= channel <= CHANNELS
 
 
 def place_of(command: Command) -> tuple[float, float] | None:

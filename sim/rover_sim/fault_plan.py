@@ -17,9 +17,10 @@ from rover_sim.frames import Frame
 from rover_sim.manual_control import BodyByHand
 from rover_sim.vehicle import Vehicle
 
+NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 FORM = re.compile(
-    r"(?:rover\s+(?P<rover>\d+)\s+)?at\s+(?P<at>[\d.]+)\s*s?\s*:\s*(?P<name>[a-z-]+)"
-    r"(?P<rest>.*?)(?:\s+for\s+(?P<lasts>\S+?)\s*s?)?\s*",
+    rf"(?:rover\s+(?P<rover>\d+)\s+)?at\s+(?P<at>{NUMBER})\s*s?\s*:\s*(?P<name>[a-z-]+)"
+    rf"(?P<rest>.*?)(?:\s+for\s+(?P<lasts>{NUMBER})\s*s?)?\s*",
     re.IGNORECASE,
 )
 EXAMPLE = "at 10 s: block-wheel left for 5 s"
@@ -126,18 +127,11 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
         event = read(tuple(form["rest"].lower().split()), frame)
     except ValueError as error:
         raise PlanError(f"{text!r}: {error}; write: {written}") from error
-    lasts = inf if form["lasts"] is None else _seconds(form["lasts"], text)
+    lasts = float(form["lasts"] or inf)
     if form["lasts"] is not None and not isinstance(event, Lasting):
         raise PlanError(f"{text!r}: {name} is over at once, leave out 'for'")
     rover = None if form["rover"] is None else int(form["rover"])
-    return PlannedFault(text.strip(), rover, _seconds(form["at"], text), event, lasts)
-
-
-def _seconds(number: str, text: str) -> float:
-    try:
-        return float(number)
-    except ValueError:
-        raise PlanError(f"{text!r}: {number!r} is not a number of seconds") from None
+    return PlannedFault(text.strip(), rover, float(form["at"]), event, lasts)
 
 
 def _only(words: Words, what: str) -> str:
@@ -149,7 +143,7 @@ def _only(words: Words, what: str) -> str:
 def _amount(words: Words, *, unit: str, known: Words) -> tuple[float, str]:
     """Return the number and the direction of "0.5 m left", "0.5m left", "left 0.5 m"."""
     joined = re.fullmatch(
-        rf"(?:(?P<before>[a-z]+) )?(?P<number>[\d.]+) ?(?:{unit})?(?: (?P<after>[a-z]+))?",
+        rf"(?:(?P<before>[a-z]+) )?(?P<number>{NUMBER}) ?(?:{unit})?(?: (?P<after>[a-z]+))?",
         " ".join(words),
     )
     if joined is None or (joined["before"] and joined["after"]):

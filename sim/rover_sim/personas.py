@@ -96,7 +96,7 @@ class Persona:
     accepted_in_silence: frozenset[int]  # ids of REQUEST_MESSAGE: accepted, but not sent
     streams: StreamTable
     stack: str  # whose flight and drive train
-    commands: Mapping[int, str]  # a method of Commands, or the name of a MAV_RESULT, by MAV_CMD
+    commands: Mapping[int, str]  # by MAV_CMD: a method of Commands, a MAV_RESULT, "": no answer
     results: Mapping[str, MavResult]  # of what is refused
     set_mode_acked_as: int  # the command id in the COMMAND_ACK of the message SET_MODE
     force_arm: tuple[float, ...]  # param2 of COMPONENT_ARM_DISARM that skips the checks

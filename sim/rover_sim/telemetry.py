@@ -1,7 +1,7 @@
 """The content of each telemetry message: the flight stack's state in MAVLink fields and units."""
 
 import math
-from collections.abc import Callable, Mapping
+from typing import Any
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavModeFlag, MavType
@@ -28,7 +28,7 @@ TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_*
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 NONE, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = range(1, 6)  # MISSION_STATE
 NOTHING = (0,) * 8
-SENT: tuple[type[Message], ...] = (
+SENT: tuple[Any, ...] = (
     m.Heartbeat,
     m.SysStatus,
     m.SystemTime,
@@ -48,44 +48,46 @@ SENT: tuple[type[Message], ...] = (
     m.CurrentMode,
     m.RcChannels,
 )
-Builder = Callable[[Estimate, int], Message | None]
+Fields = tuple[Any, ...]
 
 
 class Telemetry:
     """Builds every message that the rover can send about itself.
 
-    The method for a message has its name; it takes the estimate, and the milliseconds since boot.
+    The method for a message has its name; it takes the estimate, and the milliseconds since boot,
+    and returns the message's fields in their order, or None if there is nothing to send.
     """
 
     def __init__(self, on: Onboard, flight: Flight, *, unix_offset: float) -> None:
         self._on = on
         self._flight = flight
         self._unix_offset = unix_offset
-        self._builders: Mapping[int, Builder] = {
-            each.id: getattr(self, f"_{each.msgname.lower()}")
-            for each in SENT
-            if each.id not in on.persona.lacks
-        }
+        self._sent = {each.id: each for each in SENT if each.id not in on.persona.lacks}
 
     def knows(self, message_id: int) -> bool:
         """Return whether this rover can send the message."""
-        return message_id in self._builders or message_id in self._on.persona.accepted_in_silence
+        return message_id in self._sent or message_id in self._on.persona.accepted_in_silence
 
     def build(self, message_id: int, estimate: Estimate, now: float) -> Message | None:
         """Return the present message; None if there is nothing to send."""
         boot_ms = int((now - self._on.started) * 1000.0 + 0.5)
-        build = self._builders.get(message_id)
-        message = None if build is None else build(estimate, boot_ms)
-        if message is not None and hasattr(message, "time_boot_ms"):
+        kind = self._sent.get(message_id)
+        if kind is None:
+            return None
+        fields = getattr(self, f"_{kind.msgname.lower()}")(estimate, boot_ms)
+        if fields is None:
+            return None
+        message: Message = kind(*fields)
+        if hasattr(message, "time_boot_ms"):
             if not self._on.boot.tells_its_time(now):
                 return None
             message.time_boot_ms %= OVERFLOW
         return message
 
-    def _heartbeat(self, *_: object) -> Message:
+    def _heartbeat(self, *_: object) -> Fields:
         flight, persona = self._flight, self._on.persona
         armed = MavModeFlag.SAFETY_ARMED if flight.armed else 0
-        return m.Heartbeat(
+        return (
             MavType.GROUND_ROVER,
             persona.autopilot,
             persona.mode_flags[flight.mode] | armed,
@@ -94,7 +96,7 @@ class Telemetry:
             MAVLINK_VERSION,
         )
 
-    def _sys_status(self, _estimate: Estimate, boot_ms: int) -> Message:
+    def _sys_status(self, _estimate: Estimate, boot_ms: int) -> Fields:
         persona, faults = self._on.persona, self._on.outbox.faults
         present = SENSORS if persona.enables_prearm else SENSORS & ~PREARM
         healthy = present | persona.also_healthy | PREARM
@@ -103,60 +105,70 @@ class Telemetry:
         enabled = present
         if faults.outside_fence and persona.also_healthy & GEOFENCE:
             enabled, healthy = enabled | GEOFENCE, healthy & ~GEOFENCE
-        return m.SysStatus(
-            present, enabled, healthy, 100, 12600, 500, faults.battery, 0, 0, 0, 0, 0, 0
+        return (
+            present,
+            enabled,
+            healthy,
+            100,
+            12600,
+            500,
+            faults.battery,
+            0,
+            0,
+            0,
+            0,
+            0,
+            0,
         )  # load 10 %, 12.6 V, 5 A
 
-    def _extended_sys_state(self, *_: object) -> Message:
+    def _extended_sys_state(self, *_: object) -> Fields:
         armed, disarmed = self._on.persona.landed_states
-        return m.ExtendedSysState(0, armed if self._flight.armed else disarmed)
+        return 0, armed if self._flight.armed else disarmed
 
-    def _system_time(self, _estimate: Estimate, boot_ms: int) -> Message:
+    def _system_time(self, _estimate: Estimate, boot_ms: int) -> Fields:
         unix = self._unix_offset + self._on.started + boot_ms * 1e-3 if self._unix_offset else 0.0
-        return m.SystemTime(int(unix * 1e6), boot_ms)
+        return int(unix * 1e6), boot_ms
 
-    def _attitude(self, estimate: Estimate, boot_ms: int) -> Message:
+    def _attitude(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, has_heading = estimate, self._is_over(self._on.boot.times.heading, boot_ms)
         yaw = e.yaw if has_heading else 0.0
-        return m.Attitude(boot_ms, e.roll, e.pitch, yaw, 0.0, 0.0, e.yaw_rate)
+        return boot_ms, e.roll, e.pitch, yaw, 0.0, 0.0, e.yaw_rate
 
-    def _local_position_ned(self, estimate: Estimate, boot_ms: int) -> Message | None:
+    def _local_position_ned(self, estimate: Estimate, boot_ms: int) -> Fields | None:
         if not self._is_over(self._on.boot.times.position, boot_ms):
             return None
         e = estimate
-        return m.LocalPositionNed(boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0)
+        return boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0
 
-    def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Message:
+    def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, heading = estimate, _centidegrees(estimate.yaw)
         if not self._is_over(self._on.boot.times.position, boot_ms):
-            return m.GlobalPositionInt(boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading)
+            return boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading
         place = self._on.origin.to_global_cut(e.north, e.east)
         velocity = (_cm(e.vn), _cm(e.ve), 0)
-        return m.GlobalPositionInt(
-            boot_ms, *place, self._altitude(e), round(-e.down * 1e3), *velocity, heading
-        )
+        return boot_ms, *place, self._altitude(e), round(-e.down * 1e3), *velocity, heading
 
-    def _gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Message:
+    def _gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, time_us = estimate, boot_ms * 1000
         has_fix = self._is_over(self._on.boot.times.fix, boot_ms)
         if self._on.outbox.faults.gps_lost or not has_fix:
-            return m.GpsRawInt(time_us, 0, 0, 0, 0, UNKNOWN_U16, UNKNOWN_U16, 0, 0, 0)
+            return time_us, 0, 0, 0, 0, UNKNOWN_U16, UNKNOWN_U16, 0, 0, 0
         place, course = self._on.origin.to_global(e.north, e.east), math.atan2(e.ve, e.vn)
         motion = (_cm(e.ground_speed), _centidegrees(course))
         # HDOP and VDOP in hundredths; 10 satellites
-        return m.GpsRawInt(time_us, GPS_FIX_3D, *place, self._altitude(e), 121, 200, *motion, 10)
+        return time_us, GPS_FIX_3D, *place, self._altitude(e), 121, 200, *motion, 10
 
     def _altitude(self, estimate: Estimate) -> int:
         return round((self._on.origin.altitude - estimate.down) * 1e3)
 
-    def _vfr_hud(self, estimate: Estimate, _boot_ms: int) -> Message:
+    def _vfr_hud(self, estimate: Estimate, _boot_ms: int) -> Fields:
         speed = estimate.ground_speed
         throttle = min(100, round(abs(estimate.forward_speed) * 20)) if self._flight.armed else 0
         heading = _centidegrees(estimate.yaw) // 100
         altitude = self._on.origin.altitude - estimate.down
-        return m.VfrHud(speed, speed, heading, throttle, altitude, 0.0)
+        return speed, speed, heading, throttle, altitude, 0.0
 
-    def _home_position(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+    def _home_position(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         times = self._on.boot.times
         if not self._is_over(times.position, boot_ms):
             return None
@@ -165,21 +177,21 @@ class Telemetry:
         altitude, local = round(self._on.origin.altitude * 1e3), (north, east, 0.0)
         if not self._is_over(times.origin, boot_ms):  # recorded
             altitude, local = NO_ALTITUDE, (math.nan,) * 3
-        return m.HomePosition(*place, altitude, *local, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000)
+        return *place, altitude, *local, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000
 
-    def _gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+    def _gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         on = self._on
         if not (on.realism.tells_origin and self._is_over(on.boot.times.origin, boot_ms)):
             return None
         altitude = round(on.origin.altitude * 1e3)
-        return m.GpsGlobalOrigin(*on.origin.in_degrees_e7, altitude, boot_ms * 1000)
+        return *on.origin.in_degrees_e7, altitude, boot_ms * 1000
 
-    def _rc_channels(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+    def _rc_channels(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         sticks = self._on.sticks
         if not sticks.is_there:
             return None
         values = (*sticks.channels(self._time(boot_ms)), *(0,) * 10, RSSI_UNKNOWN)
-        return m.RcChannels(boot_ms, 8, *values)
+        return boot_ms, 8, *values
 
     def _is_over(self, time: float, boot_ms: int) -> bool:
         return self._on.boot.has_passed(time, self._time(boot_ms))
@@ -188,15 +200,15 @@ class Telemetry:
         """Return the time that the message says."""
         return self._on.started + boot_ms * 1e-3
 
-    def _battery_status(self, *_: object) -> Message:
-        return m.BatteryStatus(0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100)
+    def _battery_status(self, *_: object) -> Fields:
+        return 0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100
 
-    def _protocol_version(self, *_: object) -> Message:
-        return m.ProtocolVersion(200, 100, 200, NOTHING, NOTHING)  # MAVLink 2, minimum 1
+    def _protocol_version(self, *_: object) -> Fields:
+        return 200, 100, 200, NOTHING, NOTHING  # MAVLink 2, minimum 1
 
-    def _autopilot_version(self, *_: object) -> Message:
+    def _autopilot_version(self, *_: object) -> Fields:
         persona = self._on.persona
-        return m.AutopilotVersion(
+        return (
             persona.capabilities,
             persona.flight_sw_version,
             *(0, 0, 0),
@@ -207,7 +219,7 @@ class Telemetry:
             self._on.uid,
         )
 
-    def _mission_current(self, *_: object) -> Message:
+    def _mission_current(self, *_: object) -> Fields:
         flight, missions = self._flight, self._on.missions
         total = missions.item_count
         if total == 0:
@@ -218,7 +230,7 @@ class Telemetry:
             state = ACTIVE
         else:
             state = PAUSED if missions.current > 0 else NOT_STARTED
-        return m.MissionCurrent(
+        return (
             flight.current_item,
             total or self._on.persona.no_mission_total,
             state,
@@ -226,22 +238,20 @@ class Telemetry:
             *map(missions.plan_id, (MISSION, FENCE, RALLY)),
         )
 
-    def _position_target_global_int(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+    def _position_target_global_int(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         destination, origin = self._flight.destination, self._on.origin
         if destination is None:
             return None
         place = origin.to_global(*destination)
         if not is_on_earth(*place):
             return None  # a local place far beyond the Earth's coordinates
-        return m.PositionTargetGlobalInt(
-            boot_ms, 5, TARGET_POSITION_ONLY, *place, origin.altitude, *NOTHING
-        )
+        return boot_ms, 5, TARGET_POSITION_ONLY, *place, origin.altitude, *NOTHING
 
-    def _current_mode(self, *_: object) -> Message:
+    def _current_mode(self, *_: object) -> Fields:
         flight, persona = self._flight, self._on.persona
         offered, numbers = persona.offered_modes, persona.modes.numbers
         standard = next((each.standard for each in offered if each.mode is flight.mode), 0)
-        return m.CurrentMode(standard, numbers[flight.mode], numbers[flight.intended])
+        return standard, numbers[flight.mode], numbers[flight.intended]
 
 
 def _cm(metres: float) -> int:

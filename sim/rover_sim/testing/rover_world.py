@@ -104,10 +104,7 @@ class RoverWorld:
             if task is not None and not task.done():
                 self._cut_off(task)
 
-    def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run a coroutine like ``run``; SyncClient calls this."""
-        __tracebackhide__ = True
-        return self.run(coroutine)
+    call = run  # SyncClient's name for it
 
     def sleep(self, seconds: float) -> None:
         """Let virtual time pass. Raise Stalled beyond the marker's ``limit``."""
