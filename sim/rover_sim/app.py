@@ -11,35 +11,76 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from ipaddress import ip_address
-from math import nan
+from math import isfinite, nan, radians
 from pathlib import Path
-from typing import Annotated, Literal, TextIO
+from typing import Annotated, Literal, NamedTuple, TextIO
 
 import typer
 from typer import BadParameter, Option
 
 from mav_tasks.basics.errors import KeyRingError
 from mav_tasks.mavlink.signing import Key
-from rover_sim.body import Body, Pose
+from rover_sim.body import Body, Pose, wrap_angle
 from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet
 from rover_sim.errors import MissingExtra, SimulatedCrash
 from rover_sim.fault_plan import HELP, PlanError, PlannedFault, check_rovers, read_fault
 from rover_sim.fault_player import FaultPlayer
 from rover_sim.frames import Frame
+from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.manual_control import BodyByHand
 from rover_sim.personas import PERSONAS, Persona
 from rover_sim.real_time import drive
 from rover_sim.realism import NO_BOOT, SHORT, Gps
-from rover_sim.realism_options import Place, StickPulses, read_place, read_sticks
 from rover_sim.vehicle import Peers, make_vehicle
 
 SPACING = 3.0  # m between rovers, side by side
 KINEMATIC_SLIP = 0.3  # as for the pybullet rover
 TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
+HOME_FIELDS = 4
+PULSES = (800, 2200)  # µs, the range of a receiver
 MAX_FRICTION = 5.0  # above that of rubber on any surface
 USAGE_ERROR = 2  # exit status, as Typer's own
 ABORTED = 134  # a shell's status for SIGABRT, with which a crashing SITL ends
+
+
+class Place(NamedTuple):
+    """Start of a rover, and the origin of its local frame."""
+
+    origin: Origin = DEFAULT_ORIGIN
+    yaw: float = 0.0  # rad, clockwise from north
+
+
+class StickPulses(NamedTuple):
+    """The transmitter's pulses, µs."""
+
+    throttle: int
+    steering: int = 1500
+
+
+def read_place(text: str) -> Place:
+    """Parse ``--home``. Raise BadParameter."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != HOME_FIELDS or not all(map(isfinite, numbers)):
+        raise BadParameter(f"must be LAT,LON,ALT,HEADING in numbers, not {text!r}")
+    latitude, longitude, altitude, heading = numbers
+    if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):  # at a pole there is no east
+        raise BadParameter("latitude is within 90 degrees, longitude within 180")
+    return Place(Origin(latitude, longitude, altitude), wrap_angle(radians(heading)))
+
+
+def read_sticks(text: str) -> StickPulses:
+    """Parse ``--sticks``. Raise BadParameter."""
+    least, most = PULSES
+    parts = text.split(",")
+    if not 1 <= len(parts) <= len(StickPulses._fields) or not all(
+        part.isdecimal() and least <= int(part) <= most for part in parts
+    ):
+        raise BadParameter(f"must be one or two pulses of {least} to {most}")
+    return StickPulses(*map(int, parts))
 
 
 class StartError(Exception):

@@ -18,7 +18,6 @@ from rover_sim.commands import Commands
 from rover_sim.estimate import estimate_from
 from rover_sim.estimator import Estimator
 from rover_sim.faults import NO_FAULTS, Faults
-from rover_sim.file_transfer import refusal_of
 from rover_sim.geo import Origin
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.onboard import Onboard
@@ -40,6 +39,7 @@ REBOOT_TIME = 1.0  # s; a restarting autopilot receives and sends nothing
 #: s without satellites until the position is lost: PX4's EKF2_NOAID_TOUT; ArduPilot's EKF gives up
 #: after 5 to 10 s
 COASTS = 5.0
+NAK, FILE_NOT_FOUND = 129, 10  # of MAVLink FTP
 STACKS = {"ardupilot": (ArduPilotFlight, ArduPilotDrive), "px4": (Px4Flight, px4_drive)}
 
 
@@ -305,5 +305,13 @@ class Autopilot:
             self.outbox.send(m.Timesync(boot_ns, message.ts1))
 
     def on_file_transfer_protocol(self, message: m.FileTransferProtocol, sender: Address) -> None:
-        """Refuse a file: without an answer a client would wait for seconds."""
-        self.outbox.send(m.FileTransferProtocol(0, *sender, refusal_of(message.payload)))
+        """Refuse a file: without an answer a client would wait for seconds.
+
+        MAVLink guide, "File Transfer Protocol": a NAK has the same session, the next sequence
+        number, and the request's opcode.
+        """
+        low, high, session, opcode, *_ = message.payload
+        seq = (low | high << 8) + 1 & 0xFFFF
+        header = [seq & 0xFF, seq >> 8, session, NAK, 1, opcode, *(0,) * 6, FILE_NOT_FOUND]
+        payload = header + [0] * (len(message.payload) - len(header))
+        self.outbox.send(m.FileTransferProtocol(0, *sender, payload))

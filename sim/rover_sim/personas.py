@@ -19,7 +19,7 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavLandedState, MavResult
 from rover_sim.boot import BootScript
 from rover_sim.frames import Frame
-from rover_sim.mission_conventions import MissionConventions
+from rover_sim.mission_storage import MissionConventions
 from rover_sim.modes import Mode as Mode
 from rover_sim.modes import ModeNumbers
 from rover_sim.parameters import INT8, INT16, INT32, REAL32, Parameter

@@ -9,7 +9,7 @@ from mav_tasks.mavlink.messages import Message
 from rover_sim.estimate import Estimate
 from rover_sim.flight import Flight
 from rover_sim.geo import is_on_earth
-from rover_sim.mission_conventions import FENCE, MISSION, RALLY
+from rover_sim.mission_storage import FENCE, MISSION, RALLY
 from rover_sim.modes import Mode
 from rover_sim.onboard import Onboard
 

@@ -14,8 +14,7 @@ from mav_tasks.mavlink.stream import PeerStreams
 from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
-from rover_sim.motion import CONTROL_PERIOD
-from rover_sim.motors import LAGS, Motors
+from rover_sim.motion import CONTROL_PERIOD, LAGS, Motors
 from rover_sim.personas import ARDUPILOT, Persona
 from rover_sim.realism import Realism
 from rover_sim.signatures import RoverSignatures
