@@ -10,16 +10,16 @@ import math
 from dataclasses import dataclass
 
 from rover_sim.frames import TURN_RADIUS, Frame
-from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
+from rover_sim.motion import CONTROL_PERIOD, YawControl, clipped, toward
 from rover_sim.onboard import Onboard
-from rover_sim.steering import MAX_YAW_RATE, Demand, Output, clipped
+from rover_sim.steering import MAX_YAW_RATE, Demand, Output
 
 ACCELERATION = 1.0  # m/s², ATC_ACCEL_MAX; for braking, too
 STOPPED = 0.1  # m/s, ATC_STOP_SPEED: below this, a demand of zero cuts the throttle
 SLEW = 1.0  # of full throttle per second, MOT_SLEWRATE; it also limits how fast HOLD cuts
 PWM_STEPS = 500  # us from neutral to full
 ERROR_FILTER = 0.016  # s, ATC_SPEED_FLTE: 10 Hz
-YAW_LIMITS = YawLimits(MAX_YAW_RATE, acceleration=2.1, deceleration=3.5)  # ATC_STR_ACC_MAX
+YAW_LIMITS = MAX_YAW_RATE, 2.1, 3.5  # rad/s, and rad/s² up and down, ATC_STR_ACC_MAX
 ROLLED_OUT = 1e-3  # m/s; a slower vehicle stands
 FEED_FORWARD = 0.78  # of the lock per rad/s demanded
 STEERING_P = 0.25  # of the lock per rad/s of error
@@ -62,7 +62,7 @@ class ArduPilotDrive:
         self._on = on
         self._is_steered = on.persona.frame is Frame.ACKERMANN
         self._gains = ACKERMANN_GAINS if self._is_steered else SKID_GAINS
-        self._yaw = YawControl(YAW_LIMITS)
+        self._yaw = YawControl(*YAW_LIMITS)
         self._share = _part(self._gains.lag)
         self._asked = 0.0  # m/s, the demand after the acceleration limit
         self._error = 0.0  # m/s, filtered

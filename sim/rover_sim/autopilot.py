@@ -79,7 +79,7 @@ class Autopilot:
         self.parameters[persona.system_id_parameter] = address.system_id
         on.parameters = self.parameters
         #: the plans stored on board, for inspection
-        self.missions = on.missions = MissionStorage(on, self._go_to_item)
+        self.missions = on.missions = MissionStorage(on)
         on.sticks = Sticks(on)
         self._home_told: Destination
         self._shown_mode: Mode
@@ -198,11 +198,11 @@ class Autopilot:
         self._is_position_gone = False
         self._runtime_due = up_at + RUNTIME_INTERVAL
         fly, drive = STACKS[persona.stack]
-        self._flight = fly(on)
+        self._flight = on.flight = fly(on)
         self._drive = drive(on)
         self._home_told, self._shown_mode = self._flight.home, self.mode
-        self._telemetry = Telemetry(on, self._flight, unix_offset=self._unix_offset)
-        self._commands = Commands(on, self._flight, self._send, self._restart)
+        self._telemetry = Telemetry(on, unix_offset=self._unix_offset)
+        self._commands = Commands(on, self._send, self._restart)
 
     def _send(self, message_id: int) -> bool:
         on = self._on
@@ -242,10 +242,6 @@ class Autopilot:
 
     def _restart(self) -> None:
         self.reboot(now=self._on.now)
-
-    def _go_to_item(self, place: Destination) -> bool:
-        flight = self._flight
-        return flight.can_reposition and flight.reposition(place)
 
     def _announce(self) -> None:
         """Send a heartbeat at once if the mode changed, as some makes do."""

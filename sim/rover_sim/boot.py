@@ -21,39 +21,40 @@ class Boot:
     """One boot, from power-on at ``started``."""
 
     def __init__(self, times: BootTimes, script: BootScript, *, started: float) -> None:
-        self.times = times
+        self._times = times
         self._script = script
         self._started = started
         self._unsaid = () if times.is_none else script.texts
         self._mode_to_lose = script.keeps_to_its_first_mode and not times.is_none
 
-    def has_passed(self, time: float, now: float) -> bool:
-        """Return whether one of the times is over."""
-        return now - self._started >= time
+    def has_passed(self, time: str, now: float) -> bool:
+        """Return whether one of ``BootTimes``, by its name, is over."""
+        over: bool = now - self._started >= getattr(self._times, time)
+        return over
 
     def takes_modes(self, now: float) -> bool:
         """Return whether a mode can be entered already, although it will be lost."""
-        return self._mode_to_lose and self.has_passed(self.times.initialised, now)
+        return self._mode_to_lose and self.has_passed("initialised", now)
 
     def is_initialised(self, now: float) -> bool:
         """Return whether INITIALISING is over."""
-        return self.has_passed(max(self.times.initialised, self.times.mode_lost), now)
+        return self.has_passed("initialised", now) and self.has_passed("mode_lost", now)
 
     def tells_its_time(self, now: float) -> bool:
         """Return whether messages with its clock are sent: an ArduPilot's not in INITIALISING."""
-        return self.times.is_none or self.is_initialised(now)
+        return self._times.is_none or self.is_initialised(now)
 
     def loses_mode(self, now: float) -> bool:
         """Return True once, when a mode that was entered early is lost."""
-        if not self._mode_to_lose or not self.has_passed(self.times.mode_lost, now):
+        if not self._mode_to_lose or not self.has_passed("mode_lost", now):
             return False
         self._mode_to_lose = False
         return True
 
     def arming_refusal(self, now: float) -> tuple[str, ...]:
         """Return the texts that refuse arming; empty if the boot does not prevent arming."""
-        part = (now - self._started) / self.times.armable
-        if self.times.is_none or part >= 1.0:
+        part = (now - self._started) / self._times.armable
+        if self._times.is_none or part >= 1.0:
             return ()
         return next(texts for end, texts in self._script.refusals if part < end)
 
@@ -61,6 +62,6 @@ class Boot:
         """Return the texts that became due since the last call."""
         if not self._unsaid:
             return []
-        due = [each for each in self._unsaid if self.has_passed(getattr(self.times, each[0]), now)]
+        due = [each for each in self._unsaid if self.has_passed(each[0], now)]
         self._unsaid = tuple(each for each in self._unsaid if each not in due)
         return [text for _, text in due]

@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavModeFlag, MavResult, MavSeverity
-from rover_sim.flight import Flight
 from rover_sim.geo import is_on_earth
 from rover_sim.modes import Mode
 from rover_sim.onboard import Onboard
@@ -35,16 +34,12 @@ class Commands:
     """The actions; each takes a command and returns its result, or whether it is done."""
 
     def __init__(
-        self,
-        on: Onboard,
-        flight: Flight,
-        send: Callable[[int], bool],
-        restart: Callable[[], None],
+        self, on: Onboard, send: Callable[[int], bool], restart: Callable[[], None]
     ) -> None:
         """``send`` sends a message by its id; it returns False if the make has no such message."""
         self._on = on
         self._restart = restart
-        self._flight = flight
+        self._flight = on.flight
         self._send = send
         self._results = on.persona.results
 

@@ -4,7 +4,7 @@ MAVLink guide, "Mission Protocol"; ``MissionConventions`` has what it leaves ope
 message has its name.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from struct import pack
@@ -71,12 +71,10 @@ class _Upload:
 class MissionStorage:
     """Three lists of items and at most one upload. They survive a reboot."""
 
-    def __init__(self, on: Onboard, go_to: Callable[[Destination], bool]) -> None:
-        """``go_to`` drives to the place of a guided item; it returns False if refused."""
+    def __init__(self, on: Onboard) -> None:
         self._on = on
         self._conventions = on.persona.missions
         self._first_item = 1 if self._conventions.home_is_item_0 else 0
-        self._drive_to = go_to
         self._lists: dict[int, list[m.MissionItemInt]] = {MISSION: [], FENCE: [], RALLY: []}
         self._upload: _Upload | None = None
         self._stored: _Upload | None = None  # the last complete upload
@@ -171,10 +169,11 @@ class MissionStorage:
 
     def _go_to(self, item: Item, sender: Address) -> None:
         """Drive to an item with current = 2, which older stations send; plans have none."""
-        refusal = self._refusal(item, MISSION)
+        refusal, flight = self._refusal(item, MISSION), self._on.flight
         if refusal is None:
             place = Destination(*self._on.origin.to_local(*map(round, _place_of(item))))
-            refusal = None if self._drive_to(place) else MavMissionResult.ERROR
+            done = flight.can_reposition and flight.reposition(place)
+            refusal = None if done else MavMissionResult.ERROR
         self._ack(sender, MISSION, refusal or MavMissionResult.ACCEPTED)
 
     def _answer_stray_item(self, message: Item, sender: Address) -> None:

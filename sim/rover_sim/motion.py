@@ -16,38 +16,35 @@ LAGS = {Frame.SKID: 0.08, Frame.DIFFERENTIAL: 0.08, Frame.ACKERMANN: 0.0}
 THERE = 1e-3  # m/s, rad/s; a smaller difference counts as zero
 
 
-@dataclass(frozen=True, slots=True)
-class YawLimits:
-    """Limits of a yaw rate loop."""
-
-    rate: float  # rad/s
-    acceleration: float  # rad/s²
-    deceleration: float  # rad/s²
-    integral: float = YAW_I  # 1/s
-
-
+@dataclass(slots=True)
 class YawControl:
     """Ramps a yaw rate and closes the loop on it, because scrubbing wheels lose part of it."""
 
-    def __init__(self, limits: YawLimits) -> None:
-        self._limits = limits
-        self.yaw_rate = 0.0  # rad/s, the ramped demand
-        self._correction = 0.0
+    limit: float  # rad/s
+    acceleration: float  # rad/s²
+    deceleration: float  # rad/s²
+    integral: float = YAW_I  # 1/s
+    yaw_rate: float = 0.0  # rad/s, the ramped demand
+    correction: float = 0.0  # rad/s
 
     def step(self, demanded: float, measured: float, *, rolls: bool) -> float:
         """Return the yaw rate for the wheels, for one control period."""
-        limits = self._limits
-        wanted = max(-limits.rate, min(limits.rate, demanded))
+        wanted = clipped(demanded, self.limit)
         slows = abs(wanted) < abs(self.yaw_rate)
-        change = limits.deceleration if slows else limits.acceleration
+        change = self.deceleration if slows else self.acceleration
         rate = self.yaw_rate = toward(self.yaw_rate, wanted, change * CONTROL_PERIOD)
         if rate == 0.0 and (not rolls or abs(measured) < 1e-6):
-            self._correction = 0.0
+            self.correction = 0.0
             return 0.0  # locked wheels stop exactly
         error = rate - measured
-        integral = self._correction + limits.integral * error * CONTROL_PERIOD
-        self._correction = max(-YAW_I_LIMIT, min(YAW_I_LIMIT, integral))
-        return rate + YAW_P * error + self._correction
+        integral = self.correction + self.integral * error * CONTROL_PERIOD
+        self.correction = clipped(integral, YAW_I_LIMIT)
+        return rate + YAW_P * error + self.correction
+
+
+def clipped(value: float, limit: float) -> float:
+    """Return the value within -limit..limit."""
+    return max(-limit, min(limit, value))
 
 
 def toward(value: float, goal: float, step: float) -> float:

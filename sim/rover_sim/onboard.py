@@ -10,6 +10,7 @@ from rover_sim.outbox import Outbox
 if TYPE_CHECKING:
     from rover_sim.boot import Boot
     from rover_sim.estimate import Estimate
+    from rover_sim.flight import Flight
     from rover_sim.geo import Origin
     from rover_sim.mission_storage import MissionStorage
     from rover_sim.parameters import Parameters
@@ -39,6 +40,7 @@ class Onboard:
     # new with each start
     started: float = field(init=False)
     boot: Boot = field(init=False)
+    flight: Flight = field(init=False)
     streams: Streams = field(init=False)
 
     @property

@@ -8,10 +8,9 @@ below a quarter of the throttle.
 import math
 
 from rover_sim.frames import Frame
-from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
+from rover_sim.motion import CONTROL_PERIOD, YawControl, clipped, toward
 from rover_sim.onboard import Onboard
-from rover_sim.parameters import Parameters
-from rover_sim.steering import Demand, Output, clipped
+from rover_sim.steering import Demand, Output
 
 MANY = 1000.0  # m/s² or rad/s²: for a limit parameter of 0 or less, which means none
 # SIH's vehicle, per kg: 20 N at full throttle; the force to break away; rolling friction; drag.
@@ -32,7 +31,10 @@ class DifferentialDrive:
 
     def __init__(self, on: Onboard) -> None:
         self._on = on
-        self._yaw = YawControl(yaw_limits(on.parameters))
+        values = on.parameters  # deg/s, deg/s²
+        rate = math.radians(values["RO_YAW_RATE_LIM"])
+        up, down = (math.radians(_limit(values[f"RO_YAW_{way}_LIM"])) for way in ("ACCEL", "DECEL"))
+        self._yaw = YawControl(rate, up, down, YAW_INTEGRAL)
         self._speed = 0.0
 
     def step(self, demand: Demand) -> tuple[float, float]:
@@ -105,16 +107,6 @@ def ramped(speed: float, asked: float, on: Onboard) -> float:
     asked = clipped(asked, on.speed_limit)
     name = "RO_DECEL_LIM" if abs(asked) < abs(speed) else "RO_ACCEL_LIM"
     return toward(speed, asked, _limit(on.parameters[name]) * CONTROL_PERIOD)
-
-
-def yaw_limits(parameters: Parameters) -> YawLimits:
-    """Return RO_YAW_RATE_LIM (deg/s), RO_YAW_ACCEL_LIM and RO_YAW_DECEL_LIM (deg/s²)."""
-    return YawLimits(
-        rate=math.radians(parameters["RO_YAW_RATE_LIM"]),
-        acceleration=math.radians(_limit(parameters["RO_YAW_ACCEL_LIM"])),
-        deceleration=math.radians(_limit(parameters["RO_YAW_DECEL_LIM"])),
-        integral=YAW_INTEGRAL,
-    )
 
 
 def _limit(value: float) -> float:

@@ -8,9 +8,10 @@ import math
 
 from rover_sim.body import wrap_angle
 from rover_sim.frames import TURN_RADIUS
+from rover_sim.motion import clipped
 from rover_sim.onboard import Onboard
 from rover_sim.setpoints import Destination
-from rover_sim.steering import Demand, clipped, way_to
+from rover_sim.steering import Demand, way_to
 
 
 class Px4Guidance:

@@ -11,6 +11,7 @@ from enum import Enum
 
 from rover_sim.body import wrap_angle
 from rover_sim.estimate import Estimate
+from rover_sim.motion import clipped
 from rover_sim.setpoints import Destination
 
 MAX_YAW_RATE = 1.6  # rad/s
@@ -48,11 +49,6 @@ def way_to(estimate: Estimate, place: Destination) -> tuple[float, float]:
     """Return the distance to a place (m), and how far it is off the heading (rad)."""
     dn, de = place.north - estimate.north, place.east - estimate.east
     return math.hypot(dn, de), wrap_angle(math.atan2(de, dn) - estimate.yaw)
-
-
-def clipped(value: float, limit: float) -> float:
-    """Return the value within -limit..limit."""
-    return max(-limit, min(limit, value))
 
 
 def steer_to_heading(estimate: Estimate, yaw: float, speed: float) -> Demand:

@@ -7,7 +7,6 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavModeFlag, MavType
 from mav_tasks.mavlink.messages import Message
 from rover_sim.estimate import Estimate
-from rover_sim.flight import Flight
 from rover_sim.geo import is_on_earth
 from rover_sim.mission_storage import FENCE, MISSION, RALLY
 from rover_sim.modes import Mode
@@ -58,9 +57,9 @@ class Telemetry:
     and returns the message's fields in their order, or None if there is nothing to send.
     """
 
-    def __init__(self, on: Onboard, flight: Flight, *, unix_offset: float) -> None:
+    def __init__(self, on: Onboard, *, unix_offset: float) -> None:
         self._on = on
-        self._flight = flight
+        self._flight = on.flight
         self._unix_offset = unix_offset
         self._sent = {each.id: each for each in SENT if each.id not in on.persona.lacks}
 
@@ -100,7 +99,7 @@ class Telemetry:
         persona, faults = self._on.persona, self._on.outbox.faults
         present = SENSORS if persona.enables_prearm else SENSORS & ~PREARM
         healthy = present | persona.also_healthy | PREARM
-        if not self._is_over(self._on.boot.times.healthy, boot_ms):
+        if not self._is_over("healthy", boot_ms):
             healthy &= ~PREARM
         enabled = present
         if faults.outside_fence and persona.also_healthy & GEOFENCE:
@@ -130,19 +129,19 @@ class Telemetry:
         return int(unix * 1e6), boot_ms
 
     def _attitude(self, estimate: Estimate, boot_ms: int) -> Fields:
-        e, has_heading = estimate, self._is_over(self._on.boot.times.heading, boot_ms)
+        e, has_heading = estimate, self._is_over("heading", boot_ms)
         yaw = e.yaw if has_heading else 0.0
         return boot_ms, e.roll, e.pitch, yaw, 0.0, 0.0, e.yaw_rate
 
     def _local_position_ned(self, estimate: Estimate, boot_ms: int) -> Fields | None:
-        if not self._is_over(self._on.boot.times.position, boot_ms):
+        if not self._is_over("position", boot_ms):
             return None
         e = estimate
         return boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0
 
     def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, heading = estimate, _centidegrees(estimate.yaw)
-        if not self._is_over(self._on.boot.times.position, boot_ms):
+        if not self._is_over("position", boot_ms):
             return boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading
         place = self._on.origin.to_global_cut(e.north, e.east)
         velocity = (_cm(e.vn), _cm(e.ve), 0)
@@ -150,7 +149,7 @@ class Telemetry:
 
     def _gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, time_us = estimate, boot_ms * 1000
-        has_fix = self._is_over(self._on.boot.times.fix, boot_ms)
+        has_fix = self._is_over("fix", boot_ms)
         if self._on.outbox.faults.gps_lost or not has_fix:
             return time_us, 0, 0, 0, 0, UNKNOWN_U16, UNKNOWN_U16, 0, 0, 0
         place, course = self._on.origin.to_global(e.north, e.east), math.atan2(e.ve, e.vn)
@@ -169,19 +168,18 @@ class Telemetry:
         return speed, speed, heading, throttle, altitude, 0.0
 
     def _home_position(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
-        times = self._on.boot.times
-        if not self._is_over(times.position, boot_ms):
+        if not self._is_over("position", boot_ms):
             return None
         north, east = self._flight.home
         place = self._on.origin.to_global(north, east)
         altitude, local = round(self._on.origin.altitude * 1e3), (north, east, 0.0)
-        if not self._is_over(times.origin, boot_ms):  # recorded
+        if not self._is_over("origin", boot_ms):  # recorded
             altitude, local = NO_ALTITUDE, (math.nan,) * 3
         return *place, altitude, *local, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000
 
     def _gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         on = self._on
-        if not (on.realism.tells_origin and self._is_over(on.boot.times.origin, boot_ms)):
+        if not (on.realism.tells_origin and self._is_over("origin", boot_ms)):
             return None
         altitude = round(on.origin.altitude * 1e3)
         return *on.origin.in_degrees_e7, altitude, boot_ms * 1000
@@ -193,7 +191,7 @@ class Telemetry:
         values = (*sticks.channels(self._time(boot_ms)), *(0,) * 10, RSSI_UNKNOWN)
         return boot_ms, 8, *values
 
-    def _is_over(self, time: float, boot_ms: int) -> bool:
+    def _is_over(self, time: str, boot_ms: int) -> bool:
         return self._on.boot.has_passed(time, self._time(boot_ms))
 
     def _time(self, boot_ms: int) -> float:
