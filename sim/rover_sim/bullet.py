@@ -24,10 +24,11 @@ from rover_sim.bullet_wheels import Wheels
 from rover_sim.errors import MissingExtra
 from rover_sim.frames import Frame
 
+REMEDY = "pip install pybullet numpy; its wheels are for Python 3.11 at most, on Linux x86-64"
 #: the text for a kinematic body that replaces the pybullet one
 NO_PYBULLET = (
     "pybullet is not installed, so the rover is the kinematic one: no wheels, no friction"
-    " (pip install pybullet numpy; its wheels are for Python 3.11 at most, on Linux x86-64)"
+    f" ({REMEDY})"
 )
 PHYSICS_RATE = 240  # Hz, pybullet's own default; stepping and sub-stepping alike
 GRAVITY = 9.81  # m/s²
@@ -191,10 +192,7 @@ def _pybullet() -> Any:
         with _silent_stderr():
             import pybullet  # noqa: PLC0415
     except ImportError as error:
-        raise MissingExtra(
-            "the pybullet rover needs pybullet: pip install pybullet numpy"
-            " (its wheels are for Python 3.11 at most, on Linux x86-64)"
-        ) from error
+        raise MissingExtra(f"the pybullet rover needs pybullet: {REMEDY}") from error
     return pybullet
 
 

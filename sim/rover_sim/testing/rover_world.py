@@ -57,6 +57,7 @@ class RoverWorld:
         self.lossy_link = LossyLink(self._net)
         self._loop = VirtualLoop(self._world)
         self._runner = asyncio.Runner(loop_factory=lambda: self._loop)
+        self._runner.get_loop()
 
     def __repr__(self) -> str:
         return f"RoverWorld(at {self.now:.3f} s, seed {self.seed}, {len(self.rovers)} rovers)"
@@ -88,20 +89,14 @@ class RoverWorld:
                 "an event loop is running here already: inside of a coroutine await"
                 " rover_world.client(), and give the coroutine to rover_world.run()"
             )
-        task: asyncio.Task[T] | None = None
-
-        async def kept() -> T:
-            nonlocal task
-            task = asyncio.current_task()
-            return await coroutine
-
         self._allow(self.options.limit)
+        task = self._loop.create_task(coroutine)
         try:
-            return self._runner.run(kept())
+            return self._loop.run_until_complete(task)
         except Stalled as stalled:
             raise stalled.with_traceback(None) from None  # its message says who waits
         finally:
-            if task is not None and not task.done():
+            if not task.done():
                 self._cut_off(task)
 
     call = run  # SyncClient's name for it
@@ -135,7 +130,6 @@ class RoverWorld:
         """Cancel running tasks and release all resources."""
         self._allow(CLEAN_UP)
         try:
-            self._runner.run(_nothing())  # the runner creates its loop on its first run
             self._runner.close()
         finally:
             for body in self._bodies:
@@ -148,7 +142,7 @@ class RoverWorld:
         """Cancel the task of a stalled run, so that it does not continue in the next."""
         self._allow(CLEAN_UP * 2)
         task.cancel()
-        self._runner.run(_ended(task))
+        self._loop.run_until_complete(asyncio.wait({task}, timeout=CLEAN_UP))
 
     def _add_rover(self, number: int) -> SimulatedRover:
         persona = self.options.make
@@ -177,11 +171,3 @@ def _is_in_a_loop() -> bool:
     except RuntimeError:
         return False
     return True
-
-
-async def _nothing() -> None:
-    """Return at once."""
-
-
-async def _ended(task: asyncio.Task[Any]) -> None:
-    await asyncio.wait({task}, timeout=CLEAN_UP)
