@@ -29,7 +29,8 @@ web: basics mavlink config plans kinds tasks engine store recording metrics shel
 agents: basics mavlink config kinds tasks shell client
 probe: basics mavlink links config kinds tasks engine client
 rover_sim: basics config links mavlink
-cli: basics mavlink links config plans kinds tasks store recording shell client web agents probe rover_sim
+cli: basics mavlink links config plans kinds tasks store recording shell client web agents \
+probe rover_sim
 rover_sim.testing: client shell kinds links mavlink rover_sim config store tasks
 rover_sim.field_trial: client basics kinds links tasks
 rover_sim.demo: client basics shell kinds links recording rover_sim config tasks

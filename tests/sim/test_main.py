@@ -25,21 +25,13 @@ LIMIT = 15.0  # s for anything that a test waits for
 READY = ("--boot", "none", "--peers", "all")  # unless a test says otherwise
 
 
-def command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "rover_sim", *arguments]
-
-
-def environment(**extra: str) -> dict[str, str]:
-    path = os.pathsep.join((str(ROOT), str(ROOT / "sim")))
-    return {**os.environ, "PYTHONPATH": path, **extra}
-
-
 @contextmanager
-def simulator(*arguments: str, **extra: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
+def simulator(*arguments: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """Run it on a free port; give the process and the port."""
+    own = arguments if "--boot" in arguments else READY + arguments
     process = subprocess.Popen(
-        command("--port", "0", *(arguments if "--boot" in arguments else READY + arguments)),
-        env=environment(**extra),
+        [sys.executable, "-m", "rover_sim", "--port=0", *own],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "sim")))},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
