@@ -75,9 +75,8 @@ class Autopilot:
         on = self._on = Onboard(persona, realism, origin, uid, estimate, now)
         self.outbox = on.outbox
         #: to read or to preset
-        self.parameters = Parameters(persona.parameters, on.outbox, bytewise=persona.bytewise)
+        self.parameters = on.parameters = Parameters(on)
         self.parameters[persona.system_id_parameter] = address.system_id
-        on.parameters = self.parameters
         #: the plans stored on board, for inspection
         self.missions = on.missions = MissionStorage(on)
         on.sticks = Sticks(on)

@@ -11,7 +11,7 @@ from zlib import crc32
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
-from rover_sim.outbox import Outbox
+from rover_sim.onboard import Onboard
 
 INT8, INT16, UINT32, INT32, REAL32 = 2, 4, 5, 6, 9  # MAV_PARAM_TYPE
 BY_NAME = -1  # param_index in a request
@@ -34,23 +34,16 @@ WIRE_FORMATS = {INT32: "<i", UINT32: "<I", REAL32: "<f"}  # of bytewise makes
 class Parameters:
     """The values, and the handlers of the parameter messages. They survive a reboot."""
 
-    def __init__(
-        self,
-        parameters: tuple[Parameter, ...],
-        outbox: Outbox,
-        *,
-        bytewise: bool,
-    ) -> None:
-        """``bytewise``: an integer travels as its bytes, as on PX4, and not as a number.
+    def __init__(self, on: Onboard) -> None:
+        """A ``bytewise`` persona's integers travel as their bytes, as on PX4, not as numbers.
 
         Such a make ignores a PARAM_SET of another type than the parameter's, names the index in
         each answer, and sends a hash over the list.
         """
-        self._listed = parameters
-        self._bytewise = bytewise
+        self._listed, self._bytewise = on.persona.parameters, on.persona.bytewise
         self._indices = {each.name: index for index, each in enumerate(self._listed)}
         self._values = {each.name: each.value for each in self._listed}
-        self._outbox = outbox
+        self._outbox = on.outbox
 
     def __contains__(self, name: str) -> bool:
         return name in self._values
@@ -69,11 +62,13 @@ class Parameters:
         self._send(self._indices[name], UNNUMBERED)
 
     def on_param_request_list(self, _message: messages.ParamRequestList, _sender: Address) -> None:
+        """Send the list."""
         self._send_hash()  # PX4 sends its hash first (mavlink_parameters.cpp)
         for index in range(len(self._listed)):
             self._send(index, index)
 
     def on_param_request_read(self, message: messages.ParamRequestRead, _sender: Address) -> None:
+        """Send a parameter, by its index or its name."""
         index, name = message.param_index, _name_of(message.param_id)
         if 0 <= index < len(self._listed):
             self._send(index, index)

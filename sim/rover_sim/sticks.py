@@ -73,18 +73,15 @@ class Sticks:
 
     def arming_refusal(self) -> str | None:
         """Return the text that refuses arming, in ArduPilot's words (4.6.3), or None."""
-        if not self._adds_speed or _part(self.channels(self._on.now)[THROTTLE]) == 0.0:
-            return None
-        return "Arm: Throttle (RC3) is not neutral"
+        is_refused = self._adds_speed and self.demand().speed != 0.0
+        return "Arm: Throttle (RC3) is not neutral" if is_refused else None
 
     def nudged(self, demand: Demand) -> Demand:
         """Return the demand of a velocity setpoint in GUIDED, raised by the throttle stick."""
         if not self._adds_speed:
             return demand
-        pilot = _part(self.channels(self._on.now)[THROTTLE]) * self._top_speed
-        if demand.speed < 0.0:
-            return replace(demand, speed=min(demand.speed, pilot))
-        return replace(demand, speed=max(demand.speed, pilot))
+        larger = min if demand.speed < 0.0 else max
+        return replace(demand, speed=larger(demand.speed, self.demand().speed))
 
 
 def _part(pulse: int) -> float:
