@@ -13,7 +13,7 @@ from dataclasses import replace
 from ipaddress import ip_address
 from math import isfinite, nan, radians
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, TextIO
+from typing import Annotated, Literal, NamedTuple, NoReturn, TextIO
 
 import typer
 from typer import BadParameter, Option
@@ -206,10 +206,11 @@ def sim(
         _refuse("--system-id", "must leave the ids of all --count rovers within 1..255")
     if friction_variation and seed is None:
         _refuse("--friction-variation", "needs --seed")
-    make = (
-        replace(PERSONAS[persona], honours_yaw_rate=True) if honours_yaw_rate else PERSONAS[persona]
-    )
-    make = make if frame is None else make.on(frame)
+    make = PERSONAS[persona]
+    if frame is not None:
+        make = make.on(frame)
+    if honours_yaw_rate:
+        make = replace(make, honours_yaw_rate=True)
     realism = replace(
         make.realism,
         boot={"short": make.boot.scaled(SHORT), "real": make.boot, "none": NO_BOOT}[boot],
@@ -282,7 +283,7 @@ def sim(
         raise typer.Exit(ABORTED) from None
 
 
-def _refuse(option: str, why: str) -> None:
+def _refuse(option: str, why: str) -> NoReturn:
     raise BadParameter(why, param_hint=f"'{option}'")
 
 
@@ -306,19 +307,11 @@ def _key(name: str, ring_file: str) -> Key:
 
 def _stop_signals(stack: ExitStack) -> socket.socket:
     """Return a socket that becomes readable on SIGINT and SIGTERM."""
-    stop, wake = socket.socketpair()
-    stack.enter_context(stop)
-    stack.enter_context(wake)
+    stop, wake = map(stack.enter_context, socket.socketpair())
     wake.setblocking(False)
-
-    def wake_up(_number: int, _frame: object) -> None:
-        try:
-            wake.send(b"\0")
-        except BlockingIOError:  # buffer full: the reader is already woken
-            return
-
+    stack.callback(signal.set_wakeup_fd, signal.set_wakeup_fd(wake.fileno()))
     for number in (signal.SIGINT, signal.SIGTERM):
-        stack.callback(signal.signal, number, signal.signal(number, wake_up))
+        stack.callback(signal.signal, number, signal.signal(number, lambda *_: None))
     return stop
 
 

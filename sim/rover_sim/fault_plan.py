@@ -17,7 +17,7 @@ from rover_sim.frames import Frame
 from rover_sim.manual_control import BodyByHand
 from rover_sim.vehicle import Vehicle
 
-NUMBER = r"\d+(?:\.\d*)?|\.\d+"
+NUMBER = r"\d+(?:\.\d*)?|\.\d+"  # s, m or deg
 FORM = re.compile(
     rf"(?:rover\s+(?P<rover>\d+)\s+)?at\s+(?P<at>{NUMBER})\s*s?\s*:\s*(?P<name>[a-z-]+)"
     rf"(?P<rest>.*?)(?:\s+for\s+(?P<lasts>{NUMBER})\s*s?)?\s*",
@@ -40,7 +40,6 @@ class Lasting:
 
 #: what happens at once, to a vehicle at a time
 Event = Callable[[Vehicle, float], None]
-Words = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,62 +53,65 @@ class PlannedFault:
     lasts: float = inf  # s
 
 
-def _block_wheel(words: Words, _frame: Frame) -> Lasting:
-    return Lasting(blocked=wheels_of(_only(words, "left, right or all")))
+def _lasts(faults: Faults) -> Callable[[Frame], Lasting]:
+    return lambda _frame: Lasting(faults)
 
 
-def _freeze_output(words: Words, frame: Frame) -> Lasting:
-    output = output_of(_only(words, "the name of an output"), frame)
-    return Lasting(Faults(outputs_frozen=frozenset({output})))
+def _block_wheel(_frame: Frame, side: str) -> Lasting:
+    return Lasting(blocked=wheels_of(side))
 
 
-def _push(words: Words, _frame: Frame) -> Event:
-    metres, direction = _amount(words, unit="m", known=("forward", "back", "left", "right"))
-    signed = -metres if direction in ("back", "left") else metres
-    is_along = direction in ("forward", "back")
-    return _moved(*((signed, 0.0) if is_along else (0.0, signed)), 0.0)
+def _freeze_output(frame: Frame, name: str) -> Lasting:
+    return Lasting(Faults(outputs_frozen=frozenset({output_of(name, frame)})))
 
 
-def _turn(words: Words, _frame: Frame) -> Event:
-    degrees, direction = _amount(words, unit="deg", known=("right", "left"))
-    return _moved(0.0, 0.0, radians(degrees if direction == "right" else -degrees))
+def _push(_frame: Frame, metres: str, way: str) -> Event:
+    forward, right = (float(metres) * each for each in WAYS[way])
+    return lambda vehicle, _now: _body(vehicle).push(forward, right, 0.0)
 
 
-def _moved(forward: float, right: float, turn: float) -> Event:
-    def push(vehicle: Vehicle, _now: float) -> None:
-        cast(BodyByHand, vehicle.body).push(forward, right, turn)
-
-    return push
+def _turn(_frame: Frame, degrees: str, way: str) -> Event:
+    turn = radians(float(degrees) if way == "right" else -float(degrees))
+    return lambda vehicle, _now: _body(vehicle).push(0.0, 0.0, turn)
 
 
-def _plain(event: Lasting | Event) -> Callable[[Words, Frame], Lasting | Event]:
-    def read(words: Words, _frame: Frame) -> Lasting | Event:
-        if words:
-            raise ValueError(f"unexpected {' '.join(words)!r}")
-        return event
-
-    return read
+def _reboot(_frame: Frame) -> Event:
+    return lambda vehicle, now: vehicle.autopilot.reboot(now=now)
 
 
-#: action name: its syntax for the user, and its parser
-ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Lasting | Event]]] = {
-    "block-wheel": ("block-wheel left|right|all", _block_wheel),
-    "freeze-output": ("freeze-output left|right (ackermann: throttle|steering)", _freeze_output),
-    "lose-gps": ("lose-gps", _plain(Lasting(Faults(gps_lost=True)))),
-    "breach-fence": ("breach-fence", _plain(Lasting(Faults(outside_fence=True)))),
-    "freeze-position": ("freeze-position", _plain(Lasting(Faults(position_frozen=True)))),
-    "cut-link": ("cut-link", _plain(Lasting(Faults(silent=True, deaf=True)))),
-    "push": ("push 0.5 m forward|back|left|right", _push),
-    "turn": ("turn 30 deg right|left", _turn),
-    "reboot": ("reboot", _plain(lambda vehicle, now: vehicle.autopilot.reboot(now=now))),
-    "disarm": (
-        "disarm",
-        _plain(lambda vehicle, now: vehicle.autopilot.operator_arm(False, now=now)),
+def _disarm(_frame: Frame) -> Event:
+    return lambda vehicle, now: vehicle.autopilot.operator_arm(False, now=now)
+
+
+def _body(vehicle: Vehicle) -> BodyByHand:
+    return cast(BodyByHand, vehicle.body)
+
+
+WAYS = {"forward": (1, 0), "back": (-1, 0), "left": (0, -1), "right": (0, 1)}
+#: action name: its syntax for the user, the pattern of its arguments, and what it does
+ACTIONS: Mapping[str, tuple[str, str, Callable[..., Lasting | Event]]] = {
+    "block-wheel": ("block-wheel left|right|all", "(left|right|all)", _block_wheel),
+    "freeze-output": (
+        "freeze-output left|right (ackermann: throttle|steering)",
+        r"(\w+)",
+        _freeze_output,
     ),
+    "lose-gps": ("lose-gps", "", _lasts(Faults(gps_lost=True))),
+    "breach-fence": ("breach-fence", "", _lasts(Faults(outside_fence=True))),
+    "freeze-position": ("freeze-position", "", _lasts(Faults(position_frozen=True))),
+    "cut-link": ("cut-link", "", _lasts(Faults(silent=True, deaf=True))),
+    "push": (
+        "push 0.5 m forward|back|left|right",
+        rf"({NUMBER}) ?m ({'|'.join(WAYS)})",
+        _push,
+    ),
+    "turn": ("turn 30 deg right|left", rf"({NUMBER}) ?deg (right|left)", _turn),
+    "reboot": ("reboot", "", _reboot),
+    "disarm": ("disarm", "", _disarm),
 }
 HELP = (
     f"Cause a fault at the given time, for example '{EXAMPLE}'; repeatable."
-    f" Faults: {'; '.join(form for form, _ in ACTIONS.values())}."
+    f" Faults: {'; '.join(written for written, *_ in ACTIONS.values())}."
     " Prefix 'rover 2' selects one of several rovers; without 'for' the fault is permanent."
 )
 
@@ -122,9 +124,12 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
     name = form["name"].lower()
     if name not in ACTIONS:
         raise PlanError(f"unknown fault {name!r} in {text!r}; expected one of {', '.join(ACTIONS)}")
-    written, read = ACTIONS[name]
+    written, pattern, read = ACTIONS[name]
+    rest = re.fullmatch(pattern, " ".join(form["rest"].lower().split()))
+    if rest is None:
+        raise PlanError(f"{text!r}: write: {written}")
     try:
-        event = read(tuple(form["rest"].lower().split()), frame)
+        event = read(frame, *rest.groups())
     except ValueError as error:
         raise PlanError(f"{text!r}: {error}; write: {written}") from error
     lasts = float(form["lasts"] or inf)
@@ -132,26 +137,6 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
         raise PlanError(f"{text!r}: {name} is over at once, leave out 'for'")
     rover = None if form["rover"] is None else int(form["rover"])
     return PlannedFault(text.strip(), rover, float(form["at"]), event, lasts)
-
-
-def _only(words: Words, what: str) -> str:
-    if len(words) != 1:
-        raise ValueError(f"expected {what}")
-    return words[0]
-
-
-def _amount(words: Words, *, unit: str, known: Words) -> tuple[float, str]:
-    """Return the number and the direction of "0.5 m left", "0.5m left", "left 0.5 m"."""
-    joined = re.fullmatch(
-        rf"(?:(?P<before>[a-z]+) )?(?P<number>{NUMBER}) ?(?:{unit})?(?: (?P<after>[a-z]+))?",
-        " ".join(words),
-    )
-    if joined is None or (joined["before"] and joined["after"]):
-        raise ValueError("expected an amount and a direction")
-    direction = joined["before"] or joined["after"] or known[0]
-    if direction not in known:
-        raise ValueError(f"expected {', '.join(known)}, not {direction!r}")
-    return float(joined["number"]), direction
 
 
 def check_rovers(plan: Iterable[PlannedFault], numbers: Container[int]) -> None:
