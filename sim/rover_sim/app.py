@@ -246,7 +246,7 @@ def sim(
                     sys.stderr.write(f"rover_sim: {NO_PYBULLET}\n")
             key = _key(sign, keys) if sign else None
             stop = _stop_signals(stack)
-            bodies = [BodyByHand(body_of(index), frame=make.frame) for index in range(count)]
+            bodies = [BodyByHand(body_of(index)) for index in range(count)]
             for each in bodies:
                 stack.callback(each.close)
             server = _open_socket(host, port, stack, is_allowed=insecure or key is not None)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import inf, radians
 from typing import cast
 
-from rover_sim.actuators import Actuator, output_of, wheels_of
-from rover_sim.faults import NO_FAULTS, Faults
+from rover_sim.actuators import output_of, wheels_of
+from rover_sim.faults import Faults
 from rover_sim.frames import Frame
 from rover_sim.manual_control import BodyByHand
 from rover_sim.vehicle import Vehicle
@@ -30,14 +30,6 @@ class PlanError(Exception):
     """A fault that cannot be parsed; the message is one line for the user."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lasting:
-    """A fault that lasts until its end."""
-
-    faults: Faults = NO_FAULTS
-    blocked: frozenset[Actuator] = frozenset()
-
-
 #: what happens at once, to a vehicle at a time
 Event = Callable[[Vehicle, float], None]
 
@@ -49,20 +41,20 @@ class PlannedFault:
     text: str  # as given
     rover: int | None  # system id; None: every rover
     at: float  # s since the simulator started
-    event: Lasting | Event
+    event: Faults | Event
     lasts: float = inf  # s
 
 
-def _lasts(faults: Faults) -> Callable[[Frame], Lasting]:
-    return lambda _frame: Lasting(faults)
+def _lasts(faults: Faults) -> Callable[[Frame], Faults]:
+    return lambda _frame: faults
 
 
-def _block_wheel(_frame: Frame, side: str) -> Lasting:
-    return Lasting(blocked=wheels_of(side))
+def _block_wheel(_frame: Frame, side: str) -> Faults:
+    return Faults(wheels_blocked=wheels_of(side))
 
 
-def _freeze_output(frame: Frame, name: str) -> Lasting:
-    return Lasting(Faults(outputs_frozen=frozenset({output_of(name, frame)})))
+def _freeze_output(frame: Frame, name: str) -> Faults:
+    return Faults(outputs_frozen=frozenset({output_of(name, frame)}))
 
 
 def _push(_frame: Frame, metres: str, way: str) -> Event:
@@ -89,7 +81,7 @@ def _body(vehicle: Vehicle) -> BodyByHand:
 
 WAYS = {"forward": (1, 0), "back": (-1, 0), "left": (0, -1), "right": (0, 1)}
 #: action name: its syntax for the user, the pattern of its arguments, and what it does
-ACTIONS: Mapping[str, tuple[str, str, Callable[..., Lasting | Event]]] = {
+ACTIONS: Mapping[str, tuple[str, str, Callable[..., Faults | Event]]] = {
     "block-wheel": ("block-wheel left|right|all", "(left|right|all)", _block_wheel),
     "freeze-output": (
         "freeze-output left|right (ackermann: throttle|steering)",
@@ -133,7 +125,7 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
     except ValueError as error:
         raise PlanError(f"{text!r}: {error}; write: {written}") from error
     lasts = float(form["lasts"] or inf)
-    if form["lasts"] is not None and not isinstance(event, Lasting):
+    if form["lasts"] is not None and not isinstance(event, Faults):
         raise PlanError(f"{text!r}: {name} is over at once, leave out 'for'")
     rover = None if form["rover"] is None else int(form["rover"])
     return PlannedFault(text.strip(), rover, float(form["at"]), event, lasts)

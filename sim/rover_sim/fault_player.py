@@ -4,11 +4,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from functools import reduce
 from operator import or_
-from typing import cast
 
-from rover_sim.fault_plan import Lasting, PlannedFault
+from rover_sim.fault_plan import PlannedFault
 from rover_sim.faults import NO_FAULTS, Faults
-from rover_sim.manual_control import BodyByHand
 from rover_sim.vehicle import Vehicle
 
 
@@ -26,7 +24,7 @@ class FaultPlayer:
         while self._begin and self._begin[0].at <= elapsed:
             fault = self._begin.pop(0)
             said.append(f"{elapsed:.1f} s: {fault.text}")
-            if isinstance(fault.event, Lasting):
+            if isinstance(fault.event, Faults):
                 self._lasting.append(fault)
                 self._break()
             else:
@@ -42,11 +40,12 @@ class FaultPlayer:
     def _break(self) -> None:
         """Apply the present lasting faults to each rover, and clear the others."""
         for rover in self._rovers:
-            faults = [fault for fault in self._lasting if rover in self._of(fault)]
-            lasting = [each.event for each in faults if isinstance(each.event, Lasting)]
-            blocked = (each.blocked for each in lasting)
-            cast(BodyByHand, rover.body).blocked = reduce(or_, blocked, frozenset())
-            rover.autopilot.set_faults(joined([each.faults for each in lasting]))
+            lasting = [
+                fault.event
+                for fault in self._lasting
+                if isinstance(fault.event, Faults) and rover in self._of(fault)
+            ]
+            rover.autopilot.set_faults(joined(lasting))
 
     def _of(self, fault: PlannedFault) -> list[Vehicle]:
         return [

@@ -1,10 +1,8 @@
-"""A body that a tester can carry and turn, and whose wheels can be blocked."""
+"""A body that a tester can carry and turn."""
 
 from math import cos, sin
 
-from rover_sim.actuators import Actuator, with_blocked
 from rover_sim.body import Body, BodyState, Pose, wrap_angle
-from rover_sim.frames import Frame
 
 
 class BodyByHand:
@@ -13,11 +11,9 @@ class BodyByHand:
     The ground is the same everywhere, so moving a rover means moving the ground's frame under it.
     """
 
-    def __init__(self, body: Body, *, frame: Frame = Frame.SKID) -> None:
+    def __init__(self, body: Body) -> None:
         self._body = body
         self._offset: Pose | None = None  # of the body's frame; None: not moved yet
-        self._frame = frame
-        self.blocked: frozenset[Actuator] = frozenset()  # sides with blocked wheels
 
     @property
     def lag(self) -> float:
@@ -51,8 +47,8 @@ class BodyByHand:
         self.place(Pose(state.north + north, state.east + east, state.yaw + turn))
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
-        """Demand a motion, kept until the next call; blocked wheels stand."""
-        self._body.drive(*with_blocked((forward_speed, yaw_rate), self.blocked, self._frame))
+        """Demand a motion, kept until the next call."""
+        self._body.drive(forward_speed, yaw_rate)
 
     def advance(self, duration: float) -> None:
         """Step the physics by ``duration`` seconds."""

@@ -11,6 +11,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.mavlink.stream import PeerStreams
+from rover_sim.actuators import with_blocked
 from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
@@ -69,6 +70,7 @@ class Vehicle:
             uid=uid or system_id,
         )
         self._motors = Motors(wanted=LAGS[persona.frame], body=body.lag)
+        self._frame = persona.frame
         self._answers = peers
         self._signatures = None if key is None else RoverSignatures(key, unix_offset=unix_offset)
         self._streams = PeerStreams(is_stream=False)
@@ -112,7 +114,8 @@ class Vehicle:
             autopilot.outbox.release(at)
             motion = autopilot.step(body.state, now=at)
             self._collect()
-            body.drive(*self._motors.step(motion))
+            blocked = autopilot.faults.wheels_blocked
+            body.drive(*with_blocked(self._motors.step(motion), blocked, self._frame))
             body.advance(CONTROL_PERIOD)
             self._next_step = at + CONTROL_PERIOD
         autopilot.outbox.release(now)

@@ -146,7 +146,7 @@ class RoverWorld:
 
     def _add_rover(self, number: int) -> SimulatedRover:
         persona = self.options.make
-        body = BodyByHand(self._make_body(number), frame=persona.frame)
+        body = BodyByHand(self._make_body(number))
         self._bodies.append(body)
         seed = self.seed + number
         vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona, seed=seed)

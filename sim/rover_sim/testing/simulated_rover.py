@@ -104,11 +104,12 @@ class SimulatedRover:
 
         Raise ValueError for any other side.
         """
-        self._body.blocked |= wheels_of(side)
+        faults = self._autopilot.faults
+        self.set_faults(replace(faults, wheels_blocked=faults.wheels_blocked | wheels_of(side)))
 
     def free_wheels(self) -> None:
         """Release the wheels."""
-        self._body.blocked = frozenset()
+        self.set_faults(replace(self._autopilot.faults, wheels_blocked=frozenset()))
 
     def freeze_output(self, name: str) -> None:
         """Freeze an output at its present value while the rover is armed, in any mode.
