@@ -28,7 +28,6 @@ from rover_sim.fault_player import FaultPlayer
 from rover_sim.frames import Frame
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.kinematic_bodies import kinematic_body
-from rover_sim.manual_control import BodyByHand
 from rover_sim.personas import PERSONAS, Persona
 from rover_sim.real_time import drive
 from rover_sim.realism import NO_BOOT, SHORT, Gps
@@ -246,7 +245,7 @@ def sim(
                     sys.stderr.write(f"rover_sim: {NO_PYBULLET}\n")
             key = _key(sign, keys) if sign else None
             stop = _stop_signals(stack)
-            bodies = [BodyByHand(body_of(index)) for index in range(count)]
+            bodies = [body_of(index) for index in range(count)]
             for each in bodies:
                 stack.callback(each.close)
             server = _open_socket(host, port, stack, is_allowed=insecure or key is not None)

@@ -9,12 +9,10 @@ import re
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 from math import inf, radians
-from typing import cast
 
 from rover_sim.actuators import output_of, wheels_of
 from rover_sim.faults import Faults
 from rover_sim.frames import Frame
-from rover_sim.manual_control import BodyByHand
 from rover_sim.vehicle import Vehicle
 
 NUMBER = r"\d+(?:\.\d*)?|\.\d+"  # s, m or deg
@@ -59,12 +57,12 @@ def _freeze_output(frame: Frame, name: str) -> Faults:
 
 def _push(_frame: Frame, metres: str, way: str) -> Event:
     forward, right = (float(metres) * each for each in WAYS[way])
-    return lambda vehicle, _now: _body(vehicle).push(forward, right, 0.0)
+    return lambda vehicle, _now: vehicle.push(forward, right, 0.0)
 
 
 def _turn(_frame: Frame, degrees: str, way: str) -> Event:
     turn = radians(float(degrees) if way == "right" else -float(degrees))
-    return lambda vehicle, _now: _body(vehicle).push(0.0, 0.0, turn)
+    return lambda vehicle, _now: vehicle.push(0.0, 0.0, turn)
 
 
 def _reboot(_frame: Frame) -> Event:
@@ -73,10 +71,6 @@ def _reboot(_frame: Frame) -> Event:
 
 def _disarm(_frame: Frame) -> Event:
     return lambda vehicle, now: vehicle.autopilot.operator_arm(False, now=now)
-
-
-def _body(vehicle: Vehicle) -> BodyByHand:
-    return cast(BodyByHand, vehicle.body)
 
 
 WAYS = {"forward": (1, 0), "back": (-1, 0), "left": (0, -1), "right": (0, 1)}

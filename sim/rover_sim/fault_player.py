@@ -11,7 +11,7 @@ from rover_sim.vehicle import Vehicle
 
 
 class FaultPlayer:
-    """Plays a plan once, on vehicles with a BodyByHand; the same plan has the same effects."""
+    """Plays a plan once; the same plan at the same times has the same effects."""
 
     def __init__(self, plan: Iterable[PlannedFault], rovers: Sequence[Vehicle]) -> None:
         self._begin = sorted(plan, key=lambda fault: fault.at)

@@ -13,7 +13,7 @@ from mav_tasks.mavlink.signing import Key
 from mav_tasks.mavlink.stream import PeerStreams
 from rover_sim.actuators import with_blocked
 from rover_sim.autopilot import Autopilot
-from rover_sim.body import Body, BodyState
+from rover_sim.body import Body, BodyState, Pose, turned, wrap_angle
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.motion import CONTROL_PERIOD, LAGS, Motors
 from rover_sim.personas import ARDUPILOT, Persona
@@ -71,6 +71,7 @@ class Vehicle:
         )
         self._motors = Motors(wanted=LAGS[persona.frame], body=body.lag)
         self._frame = persona.frame
+        self._offset: Pose | None = None  # of the body's frame; None: not moved yet
         self._answers = peers
         self._signatures = None if key is None else RoverSignatures(key, unix_offset=unix_offset)
         self._streams = PeerStreams(is_stream=False)
@@ -87,7 +88,28 @@ class Vehicle:
     @property
     def truth(self) -> BodyState:
         """The rover's true state."""
-        return self.body.state
+        state, offset = self.body.state, self._offset
+        if offset is None:
+            return state
+        north, east = turned(state.north, state.east, offset.yaw)
+        yaw = wrap_angle(offset.yaw + state.yaw)
+        return state._replace(north=offset.north + north, east=offset.east + east, yaw=yaw)
+
+    def place(self, pose: Pose) -> None:
+        """Put the rover down at this pose. It keeps its motion relative to its heading.
+
+        The ground is the same everywhere, so this moves the ground's frame under the rover.
+        """
+        state = self.body.state
+        turn = wrap_angle(pose.yaw - state.yaw)
+        north, east = turned(state.north, state.east, turn)
+        self._offset = Pose(pose.north - north, pose.east - east, turn)
+
+    def push(self, forward: float, right: float, turn: float) -> None:
+        """Move the rover by metres along its own axes, then turn it clockwise by radians."""
+        state = self.truth
+        north, east = turned(forward, right, state.yaw)
+        self.place(Pose(state.north + north, state.east + east, state.yaw + turn))
 
     def receive(self, data: bytes, peer: Hashable, *, now: float) -> None:
         """Take a datagram of any bytes. Raise only SimulatedCrash."""
@@ -112,7 +134,7 @@ class Vehicle:
         while self._next_step <= now:
             at = self._next_step
             autopilot.outbox.release(at)
-            motion = autopilot.step(body.state, now=at)
+            motion = autopilot.step(self.truth, now=at)
             self._collect()
             blocked = autopilot.faults.wheels_blocked
             body.drive(*with_blocked(self._motors.step(motion), blocked, self._frame))

@@ -20,7 +20,6 @@ from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.errors import NotInVirtualTime, Stalled
 from rover_sim.kinematic_bodies import kinematic_body
-from rover_sim.manual_control import BodyByHand
 from rover_sim.testing.lossy import LossyLink, LossyNet, Text
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.simulated_rover import SimulatedRover
@@ -48,7 +47,7 @@ class RoverWorld:
         self._net = LossyNet(seed=seed)
         self._world = VirtualWorld(self._net)
         self._numbers = count(1)
-        self._bodies: list[BodyByHand] = []
+        self._bodies: list[Body] = []
         self.rovers = tuple(self._add_rover(number) for number in range(1, options.count + 1))
         names = tuple(f"rover{rover.system_id}" for rover in self.rovers)
         self.server = TaskServer(
@@ -146,7 +145,7 @@ class RoverWorld:
 
     def _add_rover(self, number: int) -> SimulatedRover:
         persona = self.options.make
-        body = BodyByHand(self._make_body(number))
+        body = self._make_body(number)
         self._bodies.append(body)
         seed = self.seed + number
         vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona, seed=seed)
@@ -155,7 +154,7 @@ class RoverWorld:
             # task
             vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = 5
         self._world.join(RoverParty(vehicle, self._net.link(f"rover{number}")))
-        return SimulatedRover(vehicle, body, persona=persona, clock=lambda: self.now)
+        return SimulatedRover(vehicle, persona=persona, clock=lambda: self.now)
 
     def _make_body(self, number: int) -> Body:
         start = Pose(east=SPACING * (number - 1))

@@ -7,7 +7,6 @@ from math import degrees
 from rover_sim.actuators import output_of, wheels_of
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
-from rover_sim.manual_control import BodyByHand
 from rover_sim.modes import Mode
 from rover_sim.personas import Persona
 from rover_sim.vehicle import Vehicle
@@ -18,11 +17,8 @@ STANDS = 0.01  # m/s and rad/s
 class SimulatedRover:
     """One rover. Metres, radians (clockwise from north), seconds; the truth, not telemetry."""
 
-    def __init__(
-        self, vehicle: Vehicle, body: BodyByHand, *, persona: Persona, clock: Callable[[], float]
-    ) -> None:
-        self._autopilot = vehicle.autopilot
-        self._body = body
+    def __init__(self, vehicle: Vehicle, *, persona: Persona, clock: Callable[[], float]) -> None:
+        self._vehicle, self._autopilot = vehicle, vehicle.autopilot
         self._persona = persona
         self._clock = clock
 
@@ -46,32 +42,32 @@ class SimulatedRover:
     @property
     def north(self) -> float:
         """Metres north of the ground frame's origin."""
-        return self._body.state.north
+        return self._vehicle.truth.north
 
     @property
     def east(self) -> float:
         """Metres east of the ground frame's origin."""
-        return self._body.state.east
+        return self._vehicle.truth.east
 
     @property
     def yaw(self) -> float:
         """Radians clockwise from north, -pi to pi."""
-        return self._body.state.yaw
+        return self._vehicle.truth.yaw
 
     @property
     def heading(self) -> float:
         """The yaw in degrees, 0 to 360."""
-        return degrees(self._body.state.yaw) % 360
+        return degrees(self._vehicle.truth.yaw) % 360
 
     @property
     def speed(self) -> float:
         """Metres per second along its heading; negative: backwards."""
-        return self._body.state.forward_speed
+        return self._vehicle.truth.forward_speed
 
     @property
     def stands(self) -> bool:
         """Whether the rover stands still."""
-        state = self._body.state
+        state = self._vehicle.truth
         return abs(state.forward_speed) < STANDS and abs(state.yaw_rate) < STANDS
 
     @property
@@ -93,11 +89,11 @@ class SimulatedRover:
         given = {"north": north, "east": east, "yaw": yaw}
         here = Pose(self.north, self.east, self.yaw)
         named = {name: value for name, value in given.items() if value is not None}
-        self._body.place(replace(here, **named))
+        self._vehicle.place(replace(here, **named))
 
     def push(self, *, forward: float = 0.0, right: float = 0.0, turn: float = 0.0) -> None:
         """Move the rover at once by metres along its own axes, then turn it by radians."""
-        self._body.push(forward, right, turn)
+        self._vehicle.push(forward, right, turn)
 
     def block_wheels(self, side: str = "all") -> None:
         """Block the wheels of one ``side``, "left" or "right", or all.
