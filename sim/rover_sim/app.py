@@ -1,4 +1,4 @@
-"""The command ``mav-tasks sim``: simulated rovers on one UDP socket, in real time.
+"""The command ``mav-tasks sim``: simulated rovers on one UDP socket, in real time or faster.
 
 This file has the command line, the socket and the signals; the loop is in ``real_time``.
 """
@@ -29,7 +29,7 @@ from rover_sim.frames import Frame
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import PERSONAS, Persona
-from rover_sim.real_time import drive
+from rover_sim.real_time import Clock, drive
 from rover_sim.realism import NO_BOOT, SHORT, Gps
 from rover_sim.vehicle import Peers, make_vehicle
 
@@ -38,6 +38,7 @@ KINEMATIC_SLIP = 0.3  # as for the pybullet rover
 TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
 HOME_FIELDS = 4
 PULSES = (800, 2200)  # µs, the range of a receiver
+FASTEST = 1000.0  # simulated seconds per second
 MAX_FRICTION = 5.0  # above that of rubber on any surface
 USAGE_ERROR = 2  # exit status, as Typer's own
 ABORTED = 134  # a shell's status for SIGABRT, with which a crashing SITL ends
@@ -96,6 +97,12 @@ def _number(text: str, is_good: Callable[[float], bool], what: str) -> float:
     return value
 
 
+def read_speed(text: str) -> float:
+    """Parse ``--speed``. Raise BadParameter."""
+    what = f"'real' or a number above 0, at most {FASTEST:g}"
+    return 1.0 if text == "real" else _number(text, lambda speed: 0.0 < speed <= FASTEST, what)
+
+
 def read_friction(text: str) -> float:
     """Parse ``--friction``. Raise BadParameter."""
     what = f"above 0, at most {MAX_FRICTION:g}"
@@ -149,6 +156,15 @@ def sim(
     gui: Annotated[
         bool, Option("--gui", help="Show the first rover in pybullet's window.")
     ] = False,
+    speed: Annotated[
+        float,
+        Option(
+            parser=read_speed,
+            metavar="real|NUMBER",
+            show_default="real",
+            help="Simulated seconds per real second.",
+        ),
+    ] = 1.0,
     truth: Annotated[
         str | None, Option(metavar="FILE", help="Append the true poses at 10 Hz as CSV.")
     ] = None,
@@ -250,7 +266,8 @@ def sim(
                 stack.callback(each.close)
             server = _open_socket(host, port, stack, is_allowed=insecure or key is not None)
             poses = None if truth is None else _open_truth(truth, stack)
-            now = time.monotonic()  # one start time for all rovers, so that they wake up together
+            clock = Clock(speed)
+            now = clock.now()  # one start time for all rovers, so that they wake up together
             rovers = [
                 make_vehicle(
                     each,
@@ -273,7 +290,7 @@ def sim(
                     rover.autopilot.operator_pulses(*sticks)
                 sys.stdout.write(f"rover_sim: rover {number} ({what}) on udp {where}\n")
             sys.stdout.flush()
-            drive(server, stop, rovers, poses, FaultPlayer(faults, rovers))
+            drive(server, stop, rovers, clock, poses, FaultPlayer(faults, rovers))
     except (StartError, MissingExtra) as error:
         sys.stderr.write(f"rover_sim: {error}\n")
         raise typer.Exit(USAGE_ERROR) from None

@@ -14,10 +14,23 @@ DATAGRAMS_PER_TURN = 64  # then the rovers get their turn
 TRUTH_INTERVAL = 0.1  # s
 
 
+class Clock:
+    """Simulated time: the monotonic clock, scaled by ``speed`` from its start."""
+
+    def __init__(self, speed: float) -> None:
+        self.speed = speed
+        self.start = time.monotonic()
+
+    def now(self) -> float:
+        """Return simulated seconds; at real speed they equal the monotonic clock."""
+        return self.start + (time.monotonic() - self.start) * self.speed
+
+
 def drive(
     server: socket.socket,
     stop: socket.socket,
     vehicles: list[Vehicle],
+    clock: Clock,
     truth: TextIO | None,
     faults: FaultPlayer,
 ) -> None:
@@ -25,28 +38,28 @@ def drive(
     selector = selectors.DefaultSelector()
     selector.register(server, selectors.EVENT_READ)
     selector.register(stop, selectors.EVENT_READ)
-    start = truth_due = time.monotonic()
+    truth_due = clock.now()
     with selector:
         while True:
             deadline = min(vehicle.next_deadline() for vehicle in vehicles)
-            ready = selector.select(max(0.0, deadline - time.monotonic()))
+            ready = selector.select(max(0.0, (deadline - clock.now()) / clock.speed))
             if any(key.fileobj is stop for key, _ in ready):
                 return
             if ready:
-                _read(server, vehicles)
-            now = time.monotonic()
-            for line in faults.play(now - start, now=now):
+                _read(server, vehicles, clock)
+            now = clock.now()
+            for line in faults.play(now - clock.start, now=now):
                 sys.stdout.write(f"rover_sim: {line}\n")
                 sys.stdout.flush()
             for vehicle in vehicles:
                 vehicle.handle_deadline(now=now)
                 _send(server, vehicle)
             if truth is not None and now >= truth_due:
-                _write_truth(truth, vehicles, now - start)
+                _write_truth(truth, vehicles, now - clock.start)
                 truth_due = max(truth_due + TRUTH_INTERVAL, now)
 
 
-def _read(server: socket.socket, vehicles: list[Vehicle]) -> None:
+def _read(server: socket.socket, vehicles: list[Vehicle], clock: Clock) -> None:
     for _ in range(DATAGRAMS_PER_TURN):
         try:
             data, peer = server.recvfrom(MAX_DATAGRAM)
@@ -54,7 +67,7 @@ def _read(server: socket.socket, vehicles: list[Vehicle]) -> None:
             return
         except OSError:  # an earlier datagram met a closed port: that peer will time out
             continue
-        now = time.monotonic()
+        now = clock.now()
         for vehicle in vehicles:
             vehicle.receive(data, peer, now=now)
 

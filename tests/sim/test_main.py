@@ -168,6 +168,7 @@ def test_bad_options_are_refused_by_name(capsys: pytest.CaptureFixture[str]) -> 
     for options, named in [
         (("--count", "0"), "--count"),
         (("--system-id", "255", "--count", "2"), "--system-id"),
+        (("--speed", "never"), "--speed"),
         (("--persona", "betaflight"), "--persona"),
         (("--friction", "-1"), "--friction"),
         (("--friction", "nan"), "--friction"),
