@@ -95,3 +95,7 @@ class LossyLink:
         end.callback(setattr, self._net, "ways", self._net.ways)
         self._net.ways = self._net.ways | dict.fromkeys(LEGS[leg], how)
         return end
+
+    def mend(self) -> None:
+        """Make every leg good again."""
+        self._net.ways = {}
