@@ -20,7 +20,7 @@ def _shows(name: str) -> Lazy:
 
 COMMANDS = (
     Lazy("serve", "serve:serve", "Run the task server.", kind="serve:ServeCommand"),
-    Program("sim", "rover_sim", "Run simulated rovers on UDP 14580."),
+    Lazy("sim", "sim:sim", "Run simulated rovers on UDP 14580."),
     Program("demo", "rover_sim.demo", "Run the demonstration: three tasks, driven and measured."),
     Lazy("submit", "submit:app", "Submit a task."),
     *(_shows(name) for name in ("status", "queue", "history")),

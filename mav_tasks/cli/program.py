@@ -1,4 +1,4 @@
-"""Commands that are programs of their own: the simulated rover and the demonstration."""
+"""A command that is a program of its own: the demonstration."""
 
 import os
 import re

@@ -1,6 +1,6 @@
 """The single outputs and wheels of a rover, for faults that affect one of them."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from enum import Enum
 
 from rover_sim.frames import Frame
@@ -21,13 +21,6 @@ class Actuator(Enum):
 
 
 SIDES = frozenset({Actuator.LEFT, Actuator.RIGHT})
-
-#: the motor outputs of each frame
-OUTPUTS: Mapping[Frame, tuple[Actuator, ...]] = {
-    Frame.SKID: (Actuator.LEFT, Actuator.RIGHT),
-    Frame.DIFFERENTIAL: (Actuator.LEFT, Actuator.RIGHT),
-    Frame.ACKERMANN: (Actuator.THROTTLE, Actuator.STEERING),
-}
 
 Motion = tuple[float, float]  # m/s and rad/s clockwise, the arguments of ``Body.drive``
 
@@ -85,8 +78,8 @@ def wheels_of(side: str) -> frozenset[Actuator]:
 
 def output_of(name: str, frame: Frame) -> Actuator:
     """Return the output with that name. Raise ValueError if this frame lacks it."""
-    for each in OUTPUTS[frame]:
-        if each.value == name:
-            return each
-    known = " and ".join(each.value for each in OUTPUTS[frame])
-    raise ValueError(f"the outputs of this frame ({frame.value}) are {known}, not {name!r}")
+    outputs = [each for each in Actuator if (each in SIDES) is frame.turns_on_the_spot]
+    if name in (known := [each.value for each in outputs]):
+        return Actuator(name)
+    words = " and ".join(known)
+    raise ValueError(f"the outputs of this frame ({frame.value}) are {words}, not {name!r}")

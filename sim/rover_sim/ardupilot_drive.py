@@ -8,12 +8,10 @@ m/s, HOLD and disarming at 1 m/s, 0.5 m/s with 20 deg/s).
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
-from rover_sim.body import BodyState
-from rover_sim.estimate import Estimate
-from rover_sim.frames import TURN_RADIUS
-from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
+from rover_sim.frames import TURN_RADIUS, Frame
+from rover_sim.motion import CONTROL_PERIOD, YawControl, clipped, toward
+from rover_sim.onboard import Onboard
 from rover_sim.steering import MAX_YAW_RATE, Demand, Output
 
 ACCELERATION = 1.0  # m/s², ATC_ACCEL_MAX; for braking, too
@@ -21,8 +19,10 @@ STOPPED = 0.1  # m/s, ATC_STOP_SPEED: below this, a demand of zero cuts the thro
 SLEW = 1.0  # of full throttle per second, MOT_SLEWRATE; it also limits how fast HOLD cuts
 PWM_STEPS = 500  # us from neutral to full
 ERROR_FILTER = 0.016  # s, ATC_SPEED_FLTE: 10 Hz
-YAW_LIMITS = YawLimits(MAX_YAW_RATE, acceleration=2.1, deceleration=3.5)  # ATC_STR_ACC_MAX
+YAW_LIMITS = MAX_YAW_RATE, 2.1, 3.5  # rad/s, and rad/s² up and down, ATC_STR_ACC_MAX
 ROLLED_OUT = 1e-3  # m/s; a slower vehicle stands
+FEED_FORWARD = 0.78  # of the lock per rad/s demanded
+STEERING_P = 0.25  # of the lock per rad/s of error
 
 
 def _part(time: float) -> float:
@@ -51,33 +51,29 @@ ACKERMANN_GAINS = SpeedGains(base=0.06, p=0.1, i=0.2, top=20.0, lag=2.0)
 SKID_GAINS = SpeedGains(base=0.25, p=0.2, i=0.2, top=4.0, lag=0.286)
 
 
-class Steering(Protocol):
-    """Turns a demand into a yaw rate of the wheels."""
-
-    def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
-        """Return the yaw rate (rad/s) for wheels that drive at ``speed``."""
-        ...
-
-
 class ArduPilotDrive:
-    """ArduPilot Rover's controllers; implements ``DriveTrain``."""
+    """ArduPilot Rover's controllers: speed, and a yaw rate loop.
 
-    def __init__(self, gains: SpeedGains, steering: Steering) -> None:
-        self._gains = gains
-        self._steering = steering
-        self._share = _part(gains.lag)
+    On skid steer, wheels without throttle still resist a turn. With steered wheels the loop sets
+    their angle. With the default gains it is too small: 20 deg/s at 0.5 m/s gives 10 deg/s.
+    """
+
+    def __init__(self, on: Onboard) -> None:
+        self._on = on
+        self._is_steered = on.persona.frame is Frame.ACKERMANN
+        self._gains = ACKERMANN_GAINS if self._is_steered else SKID_GAINS
+        self._yaw = YawControl(*YAW_LIMITS)
+        self._share = _part(self._gains.lag)
         self._asked = 0.0  # m/s, the demand after the acceleration limit
         self._error = 0.0  # m/s, filtered
         self._integral = 0.0  # throttle
         self._throttle = 0.0  # of the motors: -1..1, slewed
         self._speed = 0.0  # m/s, of the wheels
 
-    def __repr__(self) -> str:
-        return f"ArduPilotDrive({self._asked:.2f} m/s asked, {self._speed:.2f} m/s)"
-
-    def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
+    def step(self, demand: Demand) -> tuple[float, float]:
         """Return forward speed and yaw rate for the wheels, for one control period."""
-        if demand.output is Output.CONTROLLED:
+        estimate, is_controlled = self._on.estimate, demand.output is Output.CONTROLLED
+        if is_controlled:
             wanted = self._controlled(demand.speed, estimate.forward_speed)
         else:
             self._asked, self._error, self._integral = estimate.forward_speed, 0.0, 0.0
@@ -90,7 +86,13 @@ class ArduPilotDrive:
         self._speed += (self._gains.top * pulse - self._speed) * self._share
         if pulse == 0.0 and abs(self._speed) < ROLLED_OUT:
             self._speed = 0.0
-        return self._speed, self._steering.step(demand, truth, estimate, self._speed)
+        asked = demand.yaw_rate if is_controlled else 0.0
+        if not self._is_steered:
+            return self._speed, self._yaw.step(asked, estimate.yaw_rate, rolls=self._speed != 0.0)
+        lock = FEED_FORWARD * asked + STEERING_P * (asked - estimate.yaw_rate) if asked else 0.0
+        # reversed while the estimate says that the rover rolls backwards, as it should be
+        lock = clipped(lock if estimate.forward_speed >= 0.0 else -lock, 1.0)
+        return self._speed, self._speed * lock / TURN_RADIUS
 
     def _controlled(self, asked: float, speed: float) -> float:
         """Return the throttle that the speed loop demands, -1..1."""
@@ -102,40 +104,6 @@ class ArduPilotDrive:
         self._error += (self._asked - speed - self._error) * FILTER_SHARE
         self._integral += gains.i * self._error * CONTROL_PERIOD
         wanted = gains.base * self._asked + gains.p * self._error + self._integral
-        limited = max(-1.0, min(1.0, wanted))
+        limited = clipped(wanted, 1.0)
         self._integral -= wanted - limited
         return limited
-
-
-class SkidSteering:
-    """Skid steering by a yaw rate loop; implements ``Steering``."""
-
-    def __init__(self) -> None:
-        self._yaw = YawControl(YAW_LIMITS)
-
-    def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
-        """Return the yaw rate for the wheels; wheels without throttle still resist a turn."""
-        del truth
-        wanted = demand.yaw_rate if demand.output is Output.CONTROLLED else 0.0
-        return self._yaw.step(wanted, estimate.yaw_rate, rolls=speed != 0.0)
-
-
-class WheelSteering:
-    """Steering by a yaw rate loop that sets the angle of the front wheels; implements ``Steering``.
-
-    With the default gains the angle is too small: 20 deg/s at 0.5 m/s gives 10 deg/s. The angle is
-    reversed while the estimate says that the rover rolls backwards, as it should be.
-    """
-
-    FEED_FORWARD = 0.78  # of the lock per rad/s demanded
-    P = 0.25  # of the lock per rad/s of error
-
-    def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
-        """Return the yaw rate that the front wheels' angle gives at this speed."""
-        del truth
-        if demand.output is not Output.CONTROLLED:
-            return 0.0
-        error = demand.yaw_rate - estimate.yaw_rate
-        lock = self.FEED_FORWARD * demand.yaw_rate + self.P * error if demand.yaw_rate else 0.0
-        lock = max(-1.0, min(1.0, lock if estimate.forward_speed >= 0.0 else -lock))
-        return speed * lock / TURN_RADIUS

@@ -4,57 +4,56 @@ It behaves like the autopilot of its persona. This file connects the parts and p
 to one of them; the parts have the rules.
 """
 
-from collections.abc import Mapping
-
-from mav_tasks.mavlink import messages
-from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
-from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import BROADCAST, Address
+from mav_tasks.mavlink.codec import target_of
+from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.messages import Message
 from rover_sim.actuators import Motion, with_frozen
-from rover_sim.available_modes import available_modes
+from rover_sim.ardupilot_drive import ArduPilotDrive
+from rover_sim.ardupilot_flight import ArduPilotFlight
 from rover_sim.body import BodyState
 from rover_sim.boot import Boot
-from rover_sim.commands import CommandParts, CommandReceiver
-from rover_sim.dispatch import Handler
-from rover_sim.estimate import Estimate, estimate_from
+from rover_sim.commands import Commands
+from rover_sim.estimate import estimate_from
 from rover_sim.estimator import Estimator
 from rover_sim.faults import NO_FAULTS, Faults
-from rover_sim.file_transfer import refusal_of
-from rover_sim.flight import FlightControl
-from rover_sim.flight_rules import FlightParts
 from rover_sim.geo import Origin
-from rover_sim.gps_loss import GpsLoss
-from rover_sim.home import Follower
 from rover_sim.mission_storage import MissionStorage
-from rover_sim.outbox import Outbox
+from rover_sim.onboard import Onboard
 from rover_sim.parameters import Parameters
 from rover_sim.personas import Mode, Persona
+from rover_sim.px4_drive import px4_drive
+from rover_sim.px4_flight import Px4Flight
 from rover_sim.realism import Realism
-from rover_sim.setpoints import Destination
+from rover_sim.setpoints import Destination, Global, Local
 from rover_sim.sticks import Sticks
-from rover_sim.streams import Streams, with_sticks
+from rover_sim.streams import Streams
 from rover_sim.telemetry import Telemetry
 from rover_sim.timing import Departures
 
-MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # clients steer by these
-UNASKED_STICKS = 1.0  # s, interval of RC_CHANNELS until a client sets another
+MEASURED = (m.Attitude.id, m.LocalPositionNed.id)  # clients steer by these
 RUNTIME_INTERVAL = 30.0  # s, AP_Stats' flush_interval_ms
-POSITIONS = (messages.LocalPositionNed.id, messages.GlobalPositionInt.id)
-FASTEST = 5.0  # m/s, the speed limit if the parameter sets none
+POSITIONS = (m.LocalPositionNed.id, m.GlobalPositionInt.id)
 REBOOT_TIME = 1.0  # s; a restarting autopilot receives and sends nothing
+#: s without satellites until the position is lost: PX4's EKF2_NOAID_TOUT; ArduPilot's EKF gives up
+#: after 5 to 10 s
+COASTS = 5.0
+NAK, FILE_NOT_FOUND = 129, 10  # of MAVLink FTP
+STACKS = {"ardupilot": (ArduPilotFlight, ArduPilotDrive), "px4": (Px4Flight, px4_drive)}
 
 
 class Autopilot:
-    """One rover's autopilot, address (system_id, 1).
+    """One rover's autopilot.
 
-    Call ``handle`` for each message, ``step`` once per control period, and ``take_messages`` after
+    Call ``handle`` for each message, ``step`` once per control period, and ``outbox.take`` after
     either. ``unix_offset`` is Unix time minus ``now``; with 0, SYSTEM_TIME says unknown.
     """
 
     def __init__(
         self,
+        address: Address,
         *,
-        system_id: int,
         persona: Persona,
         origin: Origin,
         unix_offset: float,
@@ -62,34 +61,29 @@ class Autopilot:
         now: float,
         realism: Realism,
         seed: int,
+        uid: int,
     ) -> None:
-        self.address = Address(system_id, AUTOPILOT)
+        self.address = address
         self._persona = persona
-        self._realism = realism
-        self._estimator = (
-            None if realism.estimator is None else Estimator(realism.estimator, seed=seed)
-        )
+        errors = realism.estimator
+        self._estimator = None if errors is None else Estimator(errors, seed=seed)
         self._departures = Departures(realism.timing, seed=seed)
-        self._sticks = Sticks(realism.stick_speed)
         self._asked = 0.0  # m/s, the last demand
         self._outputs: Motion = (0.0, 0.0)  # of the motors
-        self._origin = origin
         self._unix_offset = unix_offset
-        self._outbox = Outbox()
-        listed = persona.parameters
-        self._runtime = persona.runtime_parameter
-        if self._runtime is not None:
-            listed += (self._runtime,)
-        self._parameters = Parameters(listed, persona.parameter_protocol, self._outbox)
-        self._parameters[persona.system_id_parameter] = system_id
-        self._missions = MissionStorage(
-            conventions=persona.missions, origin=origin, outbox=self._outbox
-        )
-        self._estimate: Estimate = estimate_from(self._seen(truth), NO_FAULTS, None)
-        self._faults = NO_FAULTS
+        estimate = estimate_from(self._seen(truth), NO_FAULTS, None)
+        on = self._on = Onboard(persona, realism, origin, uid, estimate, now)
+        self.outbox = on.outbox
+        #: to read or to preset
+        self.parameters = on.parameters = Parameters(on)
+        self.parameters[persona.system_id_parameter] = address.system_id
+        #: the plans stored on board, for inspection
+        self.missions = on.missions = MissionStorage(on)
+        on.sticks = Sticks(on)
+        self._home_told: Destination
+        self._shown_mode: Mode
         self._clock_stopped_at = now  # time of the last step with a running clock
         self.boots = 0  #: number of restarts
-        self._home_told: Destination
         self._start(now)
 
     def __repr__(self) -> str:
@@ -100,50 +94,42 @@ class Autopilot:
 
         Raise SimulatedCrash for a message that makes the real autopilot abort.
         """
-        if self._faults.deaf or now < self._up_at or not self._is_for_us(message):
+        on = self._on
+        if on.outbox.faults.deaf or now < on.started or not self._is_for_us(message):
             return
-        if (handler := self._handlers.get(message.get_msgId())) is not None:
-            handler(message, sender, now)
-            self._announce(now)
+        name = f"on_{message.get_type().lower()}"
+        for part in (self, self.missions, self.parameters):
+            if (handler := getattr(part, name, None)) is not None:
+                on.now = now
+                handler(message, sender)
+                self._announce()
 
-    def step(self, truth: BodyState, *, now: float) -> tuple[float, float]:
+    def step(self, truth: BodyState, *, now: float) -> Motion:
         """Advance by one control period; return forward speed and yaw rate for the wheels."""
-        self._estimate = estimate_from(self._seen(truth), self._faults, self._estimate)
-        if not self._faults.clock_frozen:
+        on, faults = self._on, self.faults
+        on.now = now
+        on.estimate = estimate_from(self._seen(truth), faults, on.estimate)
+        if not faults.clock_frozen:
             self._clock_stopped_at = now
-        if now < self._up_at:
+        if now < on.started:
             return 0.0, 0.0
-        if self._gps.watch(self._faults, now=now):
-            self._flight.lose_position()
-        demand = self._flight.demand(self._estimate, now=now)
+        self._watch_satellites()
+        demand = self._flight.demand()
         if self._flight.home != self._home_told:
-            self._home_told = self._flight.home
+            self._home_told, self._shown_mode = self._flight.home, self.mode
             if self._persona.home.is_told:
-                self._send(messages.HomePosition.id, now)
-        self._missions.step(now=now)
-        self._count_runtime(now)
-        self._announce(now)
-        for message_id in self._streams.take_due(now=now):
-            self._send(message_id, now)
+                self._send(m.HomePosition.id)
+        on.missions.step()
+        self._count_runtime()
+        self._announce()
+        for message_id in on.streams.take_due(now):
+            self._send(message_id)
         self._asked = demand.speed
-        outputs = self._motion.step(demand, truth, self._estimate)
+        outputs = self._drive.step(demand)
         if self._flight.armed:
-            outputs = with_frozen(outputs, self._outputs, self._faults.outputs_frozen)
+            outputs = with_frozen(outputs, self._outputs, faults.outputs_frozen)
         self._outputs = outputs
         return outputs
-
-    def take_messages(self) -> list[Message]:
-        """Return the messages to send, each to everybody on the link."""
-        return self._outbox.take()
-
-    @property
-    def next_release(self) -> float:
-        """Time at which the next delayed message is due; infinity if there is none."""
-        return self._outbox.next_release
-
-    def release(self, *, now: float) -> None:
-        """Send the delayed messages that are due."""
-        self._outbox.release(now=now)
 
     @property
     def armed(self) -> bool:
@@ -156,46 +142,37 @@ class Autopilot:
         return self._flight.mode
 
     @property
-    def missions(self) -> MissionStorage:
-        """The plans stored on board, for inspection."""
-        return self._missions
-
-    @property
-    def parameters(self) -> Parameters:
-        """The parameters, to read or to preset."""
-        return self._parameters
-
-    @property
     def faults(self) -> Faults:
         """The present faults."""
-        return self._faults
+        return self.outbox.faults
 
     def set_faults(self, faults: Faults) -> None:
         """Replace the faults; ``Faults()`` clears them all."""
-        was_inside = not self._faults.outside_fence
-        self._faults = self._outbox.faults = self._flight.faults = faults
+        was_inside = not self.faults.outside_fence
+        self.outbox.faults = faults
         if faults.outside_fence and was_inside:
             self._flight.leave_fence()
 
     def operator_mode(self, mode: Mode, *, now: float) -> None:
         """Change the mode like an RC switch; ignore a mode that the persona lacks."""
+        self._on.now = now
         if mode in self._persona.modes.numbers:
             self._flight.enter(mode)
-        self._announce(now)
+        self._announce()
 
     def operator_arm(self, armed: bool, *, now: float) -> None:
         """Arm or disarm at the vehicle."""
+        self._on.now = now
         self._flight.set_armed(armed)
-        self._announce(now)
+        self._announce()
 
     def operator_sticks(self, forward_speed: float, yaw_rate: float) -> None:
-        """Hold the sticks (m/s, rad/s) until the mode changes; for MANUAL and POSITION."""
-        self._flight.set_sticks(forward_speed, yaw_rate)
-        self._sticks.hold(forward_speed, yaw_rate)
+        """Hold the transmitter's sticks at this demand, m/s and rad/s."""
+        self._on.sticks.hold(forward_speed, yaw_rate)
 
     def operator_pulses(self, throttle: int, steering: int) -> None:
         """Hold the transmitter's sticks at these pulses, in microseconds."""
-        self._sticks.hold_pulses(throttle, steering)
+        self._on.sticks.hold_pulses(throttle, steering)
 
     def reboot(self, *, now: float) -> None:
         """Restart with the initial state and clock; keep parameters and missions."""
@@ -203,168 +180,133 @@ class Autopilot:
         self._start(now + REBOOT_TIME)
 
     def _is_for_us(self, message: Message) -> bool:
-        target = getattr(message, "target_system", BROADCAST)
-        if target not in (BROADCAST, self.address.system_id):
-            return False
-        component = getattr(message, "target_component", BROADCAST)
-        ours = (BROADCAST, self.address.component_id)
-        return component in ours or not self._persona.heeds_component
+        target = target_of(message)
+        if not self._persona.heeds_component:
+            target = target._replace(component_id=BROADCAST)
+        return target.reaches(self.address)
 
     def _seen(self, truth: BodyState) -> BodyState:
         return truth if self._estimator is None else self._estimator.see(truth, asked=self._asked)
 
     def _start(self, up_at: float) -> None:
-        outbox, missions, persona = self._outbox, self._missions, self._persona
-        realism = self._realism
-        self._up_at = up_at
-        self._gps = GpsLoss()
+        on, persona = self._on, self._persona
+        on.started = up_at
+        on.streams = Streams(persona.streams, up_at)
+        on.boot = Boot(on.realism.boot, persona.boot_script, started=up_at)
+        self._gps_lost_at: float | None = None
+        self._is_position_gone = False
         self._runtime_due = up_at + RUNTIME_INTERVAL
-        self._streams = Streams(with_sticks(persona.streams, UNASKED_STICKS), now=up_at)
-        boot = Boot(realism.boot, persona.boot_script, started=up_at)
-        self._motion = persona.drive(persona.frame, self._parameters)
-        rules = persona.rules(
-            FlightParts(
-                origin=self._origin,
-                parameters=self._parameters,
-                missions=missions,
-                outbox=outbox,
-                speed_limit=self._speed_limit,
-                honours_yaw_rate=persona.honours_yaw_rate,
-                started=up_at,
-                frame=persona.frame,
-                settling_time=realism.boot.armable if realism.boot.is_none else 0.0,
-            )
-        )
-        self._flight = FlightControl(
-            modes=persona.modes,
-            rules=rules,
-            missions=missions,
-            outbox=outbox,
-            home=Destination(self._estimate.north, self._estimate.east),
-            boot=boot,
-            sticks=self._sticks,
-            follower=Follower(persona.home),
-        )
-        self._flight.faults = self._faults
-        self._home_told = self._flight.home
-        missions.go_to = self._go_to_item
-        self._telemetry = Telemetry(
-            persona=persona,
-            system_id=self.address.system_id,
-            origin=self._origin,
-            flight=self._flight,
-            missions=missions,
-            unix_offset=self._unix_offset,
-            started=up_at,
-            realism=realism,
-            boot=boot,
-            sticks=self._sticks,
-        )
-        commands = CommandParts(
-            origin=self._origin,
-            flight=self._flight,
-            missions=missions,
-            streams=self._streams,
-            outbox=outbox,
-            send_now=self._send,
-            reboot=lambda now: self.reboot(now=now),
-            modes=available_modes(persona.offered_modes, persona.modes),
-        )
-        self._commands = CommandReceiver(persona.commands(commands), outbox, self._departures)
-        self._handlers = self._make_handlers()
+        fly, drive = STACKS[persona.stack]
+        self._flight = on.flight = fly(on)
+        self._drive = drive(on)
+        self._home_told, self._shown_mode = self._flight.home, self.mode
+        self._telemetry = Telemetry(on, unix_offset=self._unix_offset)
+        self._commands = Commands(on, self._send, self._restart)
 
-    def _speed_limit(self) -> float:
-        """Return the speed limit in m/s; a parameter of 0 or less means "no limit" (PX4)."""
-        limit = self._parameters[self._persona.speed_parameter]
-        return limit if limit > 0.0 else FASTEST
-
-    def _make_handlers(self) -> Mapping[int, Handler]:
-        return {
-            **self._missions.handlers,
-            **self._parameters.handlers,
-            **self._commands.handlers,
-            messages.Heartbeat.id: self._handle_heartbeat,
-            messages.SetPositionTargetLocalNed.id: self._handle_local_target,
-            messages.SetPositionTargetGlobalInt.id: self._handle_global_target,
-            messages.RequestDataStream.id: self._handle_request_data_stream,
-            messages.MissionSetCurrent.id: self._handle_mission_set_current,
-            messages.Timesync.id: self._handle_timesync,
-            messages.RcChannelsOverride.id: self._handle_override,
-            messages.FileTransferProtocol.id: self._handle_file_transfer,
-        }
-
-    def _send(self, message_id: int, now: float) -> bool:
+    def _send(self, message_id: int) -> bool:
+        on = self._on
         if not self._telemetry.knows(message_id):
             return False
-        if self._gps.is_position_gone and message_id in POSITIONS:
+        if self._is_position_gone and message_id in POSITIONS:
             return True
-        estimate = self._estimate
-        if self._faults.not_finite and message_id in MEASURED:
+        estimate = on.estimate
+        if self.faults.not_finite and message_id in MEASURED:
             estimate = estimate.without_numbers
-        if self._faults.clock_frozen:
-            now = self._clock_stopped_at
-        message = self._telemetry.build(message_id, estimate, now=now)
+        now = self._clock_stopped_at if self.faults.clock_frozen else on.now
+        message = self._telemetry.build(message_id, estimate, now)
         if message is not None:
-            is_position = message_id == messages.LocalPositionNed.id
-            at = self._departures.position_at(now=now) if is_position else now
-            self._outbox.send_at(message, at, now=now)
+            is_position = message_id == m.LocalPositionNed.id
+            at = self._departures.position_at(now) if is_position else now
+            on.outbox.send_at(message, at, now)
         return True
 
-    def _count_runtime(self, now: float) -> None:
+    def _watch_satellites(self) -> None:
+        """End what needs a position, some seconds after the satellites are lost."""
+        on = self._on
+        if not self.faults.gps_lost:
+            self._gps_lost_at, self._is_position_gone = None, False
+            return
+        if self._gps_lost_at is None:
+            self._gps_lost_at = on.now
+        if on.now - self._gps_lost_at >= COASTS and not self._is_position_gone:
+            self._is_position_gone = True
+            self._flight.lose_position()
+
+    def _count_runtime(self) -> None:
         """Count the runtime parameter up; ArduPilot sends it unasked."""
-        if self._runtime is not None and now >= self._runtime_due:
+        name, parameters = self._persona.runtime_parameter, self._on.parameters
+        if name is not None and self._on.now >= self._runtime_due:
             self._runtime_due += RUNTIME_INTERVAL
-            self._parameters.change(
-                self._runtime.name, self._parameters[self._runtime.name] + RUNTIME_INTERVAL
-            )
+            parameters.change(name, parameters[name] + RUNTIME_INTERVAL)
 
-    def _go_to_item(self, place: Destination, now: float) -> bool:
-        flight = self._flight
-        return flight.can_reposition and flight.reposition(place, now=now)
+    def _restart(self) -> None:
+        self.reboot(now=self._on.now)
 
-    def _announce(self, now: float) -> None:
-        """Send a heartbeat at once if a change occurred that this autopilot announces."""
-        if self._flight.take_changes() & self._realism.timing.announces:
-            self._send(messages.Heartbeat.id, now)
+    def _announce(self) -> None:
+        """Send a heartbeat at once if the mode changed, as some makes do."""
+        last, self._shown_mode = self._shown_mode, self.mode
+        if last is not self.mode and self._on.realism.timing.announces_mode:
+            self._send(m.Heartbeat.id)
 
-    def _handle_heartbeat(self, _message: messages.Heartbeat, sender: Address, now: float) -> None:
-        self._flight.hear_heartbeat(sender.system_id, now=now)
+    # the method for a message has its name; missions and parameters have theirs
 
-    def _handle_local_target(
-        self, message: messages.SetPositionTargetLocalNed, _sender: Address, now: float
-    ) -> None:
-        self._flight.take_local(message, self._estimate, now=now)
+    def on_command_long(self, message: m.CommandLong | m.CommandInt, sender: Address) -> None:
+        """Execute a command."""
+        result = self._commands.execute(message)
+        if result is not None:
+            self._ack(message.command, result, sender)
 
-    def _handle_global_target(
-        self, message: messages.SetPositionTargetGlobalInt, _sender: Address, now: float
-    ) -> None:
-        self._flight.take_global(message, self._estimate, now=now)
+    on_command_int = on_command_long
 
-    def _handle_override(
-        self, message: messages.RcChannelsOverride, _sender: Address, now: float
-    ) -> None:
-        if self._realism.stick_speed is not None:
-            self._sticks.take_override(message, now=now)
+    def on_set_mode(self, message: m.SetMode, sender: Address) -> None:
+        """Answer the deprecated message SET_MODE with a COMMAND_ACK, as autopilots do."""
+        outcome = self._commands.set_mode(message.base_mode, message.custom_mode)
+        result = self._commands.result_of(outcome)
+        self._ack(self._persona.set_mode_acked_as, result, sender)
 
-    def _handle_request_data_stream(
-        self, message: messages.RequestDataStream, _sender: Address, now: float
-    ) -> None:
+    def _ack(self, command: int, result: MavResult, sender: Address) -> None:
+        at = self._departures.answer_at(self._on.now)
+        self.outbox.send_at(m.CommandAck(command, result, 0, 0, *sender), at, self._on.now)
+
+    def on_heartbeat(self, _message: m.Heartbeat, sender: Address) -> None:
+        """Note a heartbeat from any system."""
+        self._flight.hear_heartbeat(sender.system_id)
+
+    def on_set_position_target_local_ned(self, message: Local | Global, _sender: Address) -> None:
+        """Take a setpoint."""
+        self._flight.take(message)
+
+    on_set_position_target_global_int = on_set_position_target_local_ned
+
+    def on_rc_channels_override(self, message: m.RcChannelsOverride, _sender: Address) -> None:
+        """Take the sticks of a client."""
+        self._on.sticks.take_override(message)
+
+    def on_request_data_stream(self, message: m.RequestDataStream, _sender: Address) -> None:
+        """Set the rate of a group of messages."""
         rate = message.req_message_rate if message.start_stop else 0
-        self._streams.set_group(message.req_stream_id, rate, now=now)
+        self._on.streams.set_group(message.req_stream_id, rate, self._on.now)
 
-    def _handle_mission_set_current(
-        self, message: messages.MissionSetCurrent, _sender: Address, now: float
-    ) -> None:
+    def on_mission_set_current(self, message: m.MissionSetCurrent, _sender: Address) -> None:
+        """Continue with another mission item."""
         if not self._flight.skip_to_item(message.seq):
-            self._outbox.say(MavSeverity.CRITICAL, "WPM: WP CURR CMD: Not in list")
-        self._send(messages.MissionCurrent.id, now)
+            self.outbox.say(MavSeverity.CRITICAL, "WPM: WP CURR CMD: Not in list")
+        self._send(m.MissionCurrent.id)
 
-    def _handle_timesync(self, message: messages.Timesync, _sender: Address, now: float) -> None:
-        if message.tc1 == 0:  # 0 marks a request; other values are responses
-            boot_ns = int((now - self._up_at) * 1e9)
-            self._outbox.send(messages.Timesync(boot_ns, message.ts1))
+    def on_timesync(self, message: m.Timesync, _sender: Address) -> None:
+        """Answer a request for the time since boot; tc1 is 0 in requests only."""
+        if message.tc1 == 0:
+            boot_ns = int((self._on.now - self._on.started) * 1e9)
+            self.outbox.send(m.Timesync(boot_ns, message.ts1))
 
-    def _handle_file_transfer(
-        self, message: messages.FileTransferProtocol, sender: Address, _now: float
-    ) -> None:
-        self._outbox.send(messages.FileTransferProtocol(0, *sender, refusal_of(message.payload)))
+    def on_file_transfer_protocol(self, message: m.FileTransferProtocol, sender: Address) -> None:
+        """Refuse a file: without an answer a client would wait for seconds.
+
+        MAVLink guide, "File Transfer Protocol": a NAK has the same session, the next sequence
+        number, and the request's opcode.
+        """
+        low, high, session, opcode, *_ = message.payload
+        seq = (low | high << 8) + 1 & 0xFFFF
+        header = [seq & 0xFF, seq >> 8, session, NAK, 1, opcode, *(0,) * 6, FILE_NOT_FOUND]
+        payload = header + [0] * (len(message.payload) - len(header))
+        self.outbox.send(m.FileTransferProtocol(0, *sender, payload))

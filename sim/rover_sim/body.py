@@ -67,3 +67,9 @@ class Body(Protocol):
 def wrap_angle(angle: float) -> float:
     """Return the same angle within -pi..pi."""
     return math.remainder(angle, math.tau)
+
+
+def turned(north: float, east: float, angle: float) -> tuple[float, float]:
+    """Return the vector (north, east), turned clockwise by ``angle`` (rad)."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    return north * cos - east * sin, north * sin + east * cos

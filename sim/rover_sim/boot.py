@@ -4,18 +4,8 @@
 """
 
 from dataclasses import dataclass
-from enum import Enum
 
-from mav_tasks.mavlink.enums import MavSeverity
 from rover_sim.realism import BootTimes
-
-
-class Event(Enum):
-    """The event that triggers a boot text; the value names the field of ``BootTimes``."""
-
-    READY = "mode_lost"
-    ORIGIN = "origin"
-    USES_GPS = "uses_gps"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,41 +13,8 @@ class BootScript:
     """Texts and mode behaviour of one make during its boot."""
 
     refusals: tuple[tuple[float, tuple[str, ...]], ...]  # (end as a part of ``armable``, texts)
-    texts: tuple[tuple[Event, MavSeverity, str], ...]
+    texts: tuple[tuple[str, str], ...]  # (the field of BootTimes after which it is said, text)
     keeps_to_its_first_mode: bool  # ArduPilot: a mode that is entered early is lost
-
-
-ARDUPILOT_SCRIPT = BootScript(
-    # recorded: the first at 1.1 s, the second from 4.1 to 13.1 s, the third from 16.1 to 22.2 s
-    refusals=(
-        (0.095, ("Arm: System not initialised",)),
-        (0.63, ("Arm: Accels inconsistent",)),
-        (1.0, ("Arm: Gyros inconsistent",)),
-    ),
-    texts=(
-        (Event.READY, MavSeverity.INFO, "ArduPilot Ready"),
-        (Event.READY, MavSeverity.INFO, "AHRS: DCM active"),
-        (Event.ORIGIN, MavSeverity.INFO, "EKF3 IMU0 origin set"),
-        (Event.ORIGIN, MavSeverity.INFO, "EKF3 IMU1 origin set"),
-        (Event.USES_GPS, MavSeverity.INFO, "EKF3 IMU0 is using GPS"),
-        (Event.USES_GPS, MavSeverity.INFO, "EKF3 IMU1 is using GPS"),
-        (Event.USES_GPS, MavSeverity.INFO, "AHRS: EKF3 active"),
-    ),
-    keeps_to_its_first_mode=True,
-)
-PX4_SCRIPT = BootScript(
-    refusals=(
-        (
-            1.0,
-            (
-                "Preflight Fail: system power unavailable",
-                "Arming denied: Resolve system health failures first",
-            ),
-        ),
-    ),
-    texts=(),
-    keeps_to_its_first_mode=False,
-)
 
 
 class Boot:
@@ -70,60 +27,41 @@ class Boot:
         self._unsaid = () if times.is_none else script.texts
         self._mode_to_lose = script.keeps_to_its_first_mode and not times.is_none
 
-    def __repr__(self) -> str:
-        return f"Boot({len(self._unsaid)} texts to come)"
+    def has_passed(self, time: str, now: float) -> bool:
+        """Return whether one of ``BootTimes``, by its name, is over."""
+        over: bool = now - self._started >= getattr(self._times, time)
+        return over
 
-    def takes_modes(self, *, now: float) -> bool:
+    def takes_modes(self, now: float) -> bool:
         """Return whether a mode can be entered already, although it will be lost."""
-        return self._mode_to_lose and now - self._started >= self._times.initialised
+        return self._mode_to_lose and self.has_passed("initialised", now)
 
-    def is_initialised(self, *, now: float) -> bool:
+    def is_initialised(self, now: float) -> bool:
         """Return whether INITIALISING is over."""
-        return now - self._started >= max(self._times.initialised, self._times.mode_lost)
+        return self.has_passed("initialised", now) and self.has_passed("mode_lost", now)
 
-    def tells_its_time(self, *, now: float) -> bool:
+    def tells_its_time(self, now: float) -> bool:
         """Return whether messages with its clock are sent: an ArduPilot's not in INITIALISING."""
-        return self._times.is_none or self.is_initialised(now=now)
+        return self._times.is_none or self.is_initialised(now)
 
-    def loses_mode(self, *, now: float) -> bool:
+    def loses_mode(self, now: float) -> bool:
         """Return True once, when a mode that was entered early is lost."""
-        if not self._mode_to_lose or now - self._started < self._times.mode_lost:
+        if not self._mode_to_lose or not self.has_passed("mode_lost", now):
             return False
         self._mode_to_lose = False
         return True
 
-    def has_heading(self, *, now: float) -> bool:
-        """Return whether the estimate has a heading."""
-        return now - self._started >= self._times.heading
-
-    def has_fix(self, *, now: float) -> bool:
-        """Return whether the receiver has a position."""
-        return now - self._started >= self._times.fix
-
-    def has_position(self, *, now: float) -> bool:
-        """Return whether the estimate has a position."""
-        return now - self._started >= self._times.position
-
-    def has_origin(self, *, now: float) -> bool:
-        """Return whether the origin is known."""
-        return now - self._started >= self._times.origin
-
-    def is_healthy(self, *, now: float) -> bool:
-        """Return whether the pre-arm checks pass."""
-        return now - self._started >= self._times.healthy
-
-    def arming_refusal(self, *, now: float) -> tuple[str, ...]:
+    def arming_refusal(self, now: float) -> tuple[str, ...]:
         """Return the texts that refuse arming; empty if the boot does not prevent arming."""
         part = (now - self._started) / self._times.armable
         if self._times.is_none or part >= 1.0:
             return ()
         return next(texts for end, texts in self._script.refusals if part < end)
 
-    def texts_due(self, *, now: float) -> list[tuple[MavSeverity, str]]:
+    def texts_due(self, now: float) -> list[str]:
         """Return the texts that became due since the last call."""
         if not self._unsaid:
             return []
-        at = now - self._started
-        due = [each for each in self._unsaid if at >= getattr(self._times, each[0].value)]
+        due = [each for each in self._unsaid if self.has_passed(each[0], now)]
         self._unsaid = tuple(each for each in self._unsaid if each not in due)
-        return [(severity, text) for _, severity, text in due]
+        return [text for _, text in due]

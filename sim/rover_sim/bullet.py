@@ -20,14 +20,15 @@ from random import Random
 from typing import Any
 
 from rover_sim.body import BodyState, Pose, wrap_angle
-from rover_sim.bullet_wheels import SkidWheels, SteeredWheels, Wheels
+from rover_sim.bullet_wheels import Wheels
 from rover_sim.errors import MissingExtra
 from rover_sim.frames import Frame
 
+REMEDY = "pip install pybullet numpy; its wheels are for Python 3.11 at most, on Linux x86-64"
 #: the text for a kinematic body that replaces the pybullet one
 NO_PYBULLET = (
     "pybullet is not installed, so the rover is the kinematic one: no wheels, no friction"
-    " (pip install pybullet numpy; its wheels are for Python 3.11 at most, on Linux x86-64)"
+    f" ({REMEDY})"
 )
 PHYSICS_RATE = 240  # Hz, pybullet's own default; stepping and sub-stepping alike
 GRAVITY = 9.81  # m/s²
@@ -71,9 +72,13 @@ class BulletBody:
         skids = frame.turns_on_the_spot
         urdf = ASSETS / ("rover.urdf" if skids else "ackermann.urdf")
         self._rover = self._build(start, urdf)
-        wheels = SkidWheels if skids else SteeredWheels
-        self._wheels: Wheels = wheels(self._p, self._client, self._rover)
-        self._spread(_wheel_frictions(friction, variation, seed))
+        self._wheels = Wheels(self._p, self._client, self._rover, steered=not skids)
+        for axle, own in zip(
+            self._wheels.axles, _wheel_frictions(friction, variation, seed), strict=True
+        ):
+            self._p.changeDynamics(
+                self._rover, axle, lateralFriction=own, physicsClientId=self._client
+            )
         self.advance(SETTLING)
         self._time = 0.0
 
@@ -163,12 +168,6 @@ class BulletBody:
         p.changeDynamics(rover, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
         return rover
 
-    def _spread(self, frictions: list[float]) -> None:
-        for joint, friction in zip(self._wheels.joints, frictions, strict=True):
-            self._p.changeDynamics(
-                self._rover, joint, lateralFriction=friction, physicsClientId=self._client
-            )
-
 
 def _wheel_frictions(friction: float, variation: float, seed: int | None) -> list[float]:
     if variation == 0.0:
@@ -193,10 +192,7 @@ def _pybullet() -> Any:
         with _silent_stderr():
             import pybullet  # noqa: PLC0415
     except ImportError as error:
-        raise MissingExtra(
-            "the pybullet rover needs pybullet: pip install pybullet numpy"
-            " (its wheels are for Python 3.11 at most, on Linux x86-64)"
-        ) from error
+        raise MissingExtra(f"the pybullet rover needs pybullet: {REMEDY}") from error
     return pybullet
 
 

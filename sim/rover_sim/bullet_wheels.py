@@ -4,8 +4,7 @@ Only ``bullet`` imports pybullet; this file gets the module as an argument.
 """
 
 import math
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from rover_sim.ackermann import steering_for
 from rover_sim.frames import SERVO_RATE, WHEEL_BASE
@@ -17,73 +16,39 @@ SERVO_TORQUE = 20.0  # N·m; the wheels turn on their contact points
 SIDES = ("front_left", "front_right", "rear_left", "rear_right")
 
 
-class Wheels(Protocol):
-    """The joints that a body's ``drive`` sets."""
+class Wheels:
+    """Four driven wheels, both of a side at the same speed; or two rear ones, and two steered."""
 
-    @property
-    def joints(self) -> tuple[int, ...]:
-        """The four axles: front left, front right, rear left, rear right."""
-        ...
-
-    def drive(self, forward_speed: float, yaw_rate: float, *, steps: int) -> None:
-        """Set every motor for this motion; one call of the engine does ``steps`` physics steps."""
-        ...
-
-
-class SkidWheels:
-    """Four driven wheels, both of a side at the same speed; implements ``Wheels``."""
-
-    def __init__(self, p: Any, client: int, rover: int) -> None:
+    def __init__(self, p: Any, client: int, rover: int, *, steered: bool) -> None:
         self._p, self._client, self._rover = p, client, rover
-        joints = joints_of(p, client, rover)
-        self.joints = tuple(joints[f"{side}_axle"] for side in SIDES)
-
-    def __repr__(self) -> str:
-        return f"SkidWheels({self.joints})"
-
-    def drive(self, forward_speed: float, yaw_rate: float, *, steps: int) -> None:
-        """Set the four motors."""
-        left = (forward_speed + yaw_rate * HALF_TRACK) / WHEEL_RADIUS  # clockwise: left is faster
-        right = (forward_speed - yaw_rate * HALF_TRACK) / WHEEL_RADIUS
-        # Bullet computes an impulse limit from the torque limit and the length of the whole step,
-        # and applies it in every sub-step: without the division the motors are ``steps`` times as
-        # strong.
-        self._p.setJointMotorControlArray(
-            self._rover,
-            self.joints,
-            self._p.VELOCITY_CONTROL,
-            targetVelocities=(left, right, left, right),
-            forces=(MAX_TORQUE / steps,) * 4,
-            physicsClientId=self._client,
+        infos = (
+            p.getJointInfo(rover, joint, client) for joint in range(p.getNumJoints(rover, client))
         )
-
-
-class SteeredWheels:
-    """Two rear wheels driven through a differential, two steered; implements ``Wheels``."""
-
-    def __init__(self, p: Any, client: int, rover: int) -> None:
-        self._p, self._client, self._rover = p, client, rover
-        joints = joints_of(p, client, rover)
-        self.joints = tuple(joints[f"{side}_axle"] for side in SIDES)
-        self._knuckles = (joints["front_left_steering"], joints["front_right_steering"])
+        joints: dict[str, int] = {info[1].decode(): info[0] for info in infos}
+        self.axles = [joints[f"{side}_axle"] for side in SIDES]
+        self._knuckles = [joints[f"{side}_steering"] for side in SIDES[:2]] if steered else []
         self._steering = 0.0  # rad, of a virtual wheel in the middle, right is positive
 
-    def __repr__(self) -> str:
-        return f"SteeredWheels({math.degrees(self._steering):.0f} deg)"
-
     def drive(self, forward_speed: float, yaw_rate: float, *, steps: int) -> None:
-        """Set servos and motors; the front wheels roll freely."""
-        self._steering = steering_for(forward_speed, yaw_rate, self._steering)
-        turned = forward_speed * math.tan(self._steering) / WHEEL_BASE
-        self._steer(steps)
-        left = (forward_speed + turned * HALF_TRACK) / WHEEL_RADIUS
-        right = (forward_speed - turned * HALF_TRACK) / WHEEL_RADIUS
+        """Set every motor for this motion; one call of the engine does ``steps`` physics steps.
+
+        Bullet computes an impulse limit from the torque limit and the length of the whole step, and
+        applies it in every sub-step: without a division the motors are ``steps`` times as strong.
+        """
+        if self._knuckles:
+            self._steering = steering_for(forward_speed, yaw_rate, self._steering)
+            yaw_rate = forward_speed * math.tan(self._steering) / WHEEL_BASE
+            self._steer(steps)
+        left = (forward_speed + yaw_rate * HALF_TRACK) / WHEEL_RADIUS  # clockwise: left is faster
+        right = (forward_speed - yaw_rate * HALF_TRACK) / WHEEL_RADIUS
+        torque = MAX_TORQUE / steps
+        rolls = bool(self._knuckles)  # the front wheels: freely
         self._p.setJointMotorControlArray(
             self._rover,
-            self.joints,
+            self.axles,
             self._p.VELOCITY_CONTROL,
-            targetVelocities=(0.0, 0.0, left, right),
-            forces=(0.0, 0.0, MAX_TORQUE / steps, MAX_TORQUE / steps),
+            targetVelocities=(*((0.0, 0.0) if rolls else (left, right)), left, right),
+            forces=(*((0.0, 0.0) if rolls else (torque, torque)), torque, torque),
             physicsClientId=self._client,
         )
 
@@ -101,10 +66,3 @@ class SteeredWheels:
                 maxVelocity=SERVO_RATE,
                 physicsClientId=self._client,
             )
-
-
-def joints_of(p: Any, client: int, rover: int) -> Mapping[str, int]:
-    """Return the joints of a rover by name."""
-    count = p.getNumJoints(rover, physicsClientId=client)
-    infos = (p.getJointInfo(rover, joint, physicsClientId=client) for joint in range(count))
-    return {info[1].decode(): info[0] for info in infos}

@@ -51,15 +51,5 @@ def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Es
         yaw, yaw_rate = last.yaw, 0.0
     if faults.says_it_stands:
         vn = ve = yaw_rate = 0.0
-    return Estimate(
-        north=north,
-        east=east,
-        down=down,
-        vn=vn,
-        ve=ve,
-        roll=truth.roll,
-        pitch=truth.pitch,
-        yaw=yaw,
-        forward_speed=truth.forward_speed,
-        yaw_rate=yaw_rate,
-    )
+    motion = (truth.forward_speed, yaw_rate)
+    return Estimate(north, east, down, vn, ve, truth.roll, truth.pitch, yaw, *motion)

@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterator
 from itertools import repeat
 from random import Random
-from typing import NamedTuple
 
 from rover_sim.body import BodyState, wrap_angle
 from rover_sim.motion import CONTROL_PERIOD, toward
@@ -18,6 +17,7 @@ PUSHES = 0.1  # m/s; a standing rover whose demand exceeds this pushes
 STANDS = 0.02  # m/s
 PUSHED_AFTER = 1.0  # s of pushing
 UPSET_FOR = 100.0  # s; recorded of PX4's SIH: from the end of pushing until it reports standstill
+NO_ERROR = (0.0, 0.0, 0.0)
 GROWS_FOR = 3.0  # s from normal to upset, and back; recorded: the heading drifts by 7 deg in 5 s
 
 
@@ -42,6 +42,12 @@ def wandering(wander: Wander, chance: Random) -> Iterator[float]:
         yield fixed + error
 
 
+def in_radians(error: Wander) -> Wander:
+    """Return an error in radians that is given in degrees."""
+    spread, least, most = map(math.radians, (error.spread, error.least, error.most))
+    return Wander(spread, error.time, least, most)
+
+
 class Estimator:
     """Sees the truth with errors. The same seed gives the same errors, step for step."""
 
@@ -51,16 +57,13 @@ class Estimator:
         self._right = wandering(error.lateral_speed, chance)
         self._north = wandering(error.position, chance)
         self._east = wandering(error.position, chance)
-        self._yaw = wandering(error.yaw, chance)
-        self._yaw_rate = wandering(error.yaw_rate, chance)
+        self._yaw = wandering(in_radians(error.yaw), chance)
+        self._yaw_rate = wandering(in_radians(error.yaw_rate), chance)
         drift = error.drift
         self._drift_north, self._drift_east = (
             repeat(0.0) if drift is None else wandering(drift, chance) for _ in range(2)
         )
         self._upset = None if error.pushing is None else Upset(error.pushing, chance)
-
-    def __repr__(self) -> str:
-        return f"Estimator(upset={self._upset!r})"
 
     def see(self, truth: BodyState, *, asked: float) -> BodyState:
         """Advance by one control period; return the state that the rover believes.
@@ -68,11 +71,13 @@ class Estimator:
         ``asked`` is the demanded speed, m/s. The velocity is measured in the ground's frame, so an
         error of the heading does not rotate it.
         """
-        upset = RIGHT if self._upset is None else self._upset.step(truth, asked=asked)
-        error = next(self._yaw) + upset.yaw
+        more_forward, more_right, more_yaw = (
+            NO_ERROR if self._upset is None else self._upset.step(truth, asked=asked)
+        )
+        error = next(self._yaw) + more_yaw
         cos, sin = math.cos(error), math.sin(error)
-        forward = truth.forward_speed * cos + truth.lateral_speed * sin + upset.forward
-        lateral = truth.lateral_speed * cos - truth.forward_speed * sin + upset.right
+        forward = truth.forward_speed * cos + truth.lateral_speed * sin + more_forward
+        lateral = truth.lateral_speed * cos - truth.forward_speed * sin + more_right
         return BodyState(
             truth.time,
             truth.north + next(self._north) + next(self._drift_north),
@@ -87,40 +92,24 @@ class Estimator:
         )
 
 
-class MoreError(NamedTuple):
-    """The additional error of an upset estimate."""
-
-    forward: float  # m/s
-    right: float  # m/s
-    yaw: float  # rad
-
-
-RIGHT = MoreError(0.0, 0.0, 0.0)
-
-
 class Upset:
     """The error of an estimator, for minutes after its rover pushed without moving."""
 
     def __init__(self, error: PushingError, chance: Random) -> None:
         self._forward = wandering(error.speed, chance)
         self._right = wandering(error.speed, chance)
-        self._yaw = wandering(error.yaw, chance)
+        self._yaw = wandering(in_radians(error.yaw), chance)
         self._pushed = 0.0  # s of uninterrupted pushing
         self._left = 0.0  # s until it recovers
         self._share = 0.0  # 0 (normal) to 1 (fully upset)
 
-    def __repr__(self) -> str:
-        return f"Upset({self._left:.1f} s)"
-
-    def step(self, truth: BodyState, *, asked: float) -> MoreError:
-        """Advance by one control period; return the additional error."""
+    def step(self, truth: BodyState, *, asked: float) -> tuple[float, float, float]:
+        """Advance by one control period; return the error forward, to the right, and of the yaw."""
         pushes = abs(asked) > PUSHES and abs(truth.forward_speed) < STANDS
         self._pushed = self._pushed + CONTROL_PERIOD if pushes else 0.0
         self._left = UPSET_FOR if self._pushed > PUSHED_AFTER else self._left - CONTROL_PERIOD
         goal = 1.0 if self._left > 0.0 else 0.0
         share = self._share = toward(self._share, goal, CONTROL_PERIOD / GROWS_FOR)
         if not share:
-            return RIGHT
-        return MoreError(
-            share * next(self._forward), share * next(self._right), share * next(self._yaw)
-        )
+            return NO_ERROR
+        return share * next(self._forward), share * next(self._right), share * next(self._yaw)

@@ -8,15 +8,17 @@
 import re
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
-from math import radians
+from math import inf, radians
 
-from rover_sim.actuators import Actuator, output_of, wheels_of
+from rover_sim.actuators import output_of, wheels_of
 from rover_sim.faults import Faults
 from rover_sim.frames import Frame
+from rover_sim.vehicle import Vehicle
 
+NUMBER = r"\d+(?:\.\d*)?|\.\d+"  # s, m or deg
 FORM = re.compile(
-    r"(?:rover\s+(?P<rover>\d+)\s+)?at\s+(?P<at>[\d.]+)\s*s?\s*:\s*(?P<name>[a-z-]+)"
-    r"(?P<rest>.*?)(?:\s+for\s+(?P<lasts>\S+?)\s*s?)?\s*",
+    rf"(?:rover\s+(?P<rover>\d+)\s+)?at\s+(?P<at>{NUMBER})\s*s?\s*:\s*(?P<name>[a-z-]+)"
+    rf"(?P<rest>.*?)(?:\s+for\s+(?P<lasts>{NUMBER})\s*s?)?\s*",
     re.IGNORECASE,
 )
 EXAMPLE = "at 10 s: block-wheel left for 5 s"
@@ -26,35 +28,8 @@ class PlanError(Exception):
     """A fault that cannot be parsed; the message is one line for the user."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lasting:
-    """A fault that lasts until its end."""
-
-    faults: Faults = Faults()  # noqa: RUF009  # frozen
-    blocked: frozenset[Actuator] = frozenset()
-
-
-@dataclass(frozen=True, slots=True)
-class Push:
-    """A displacement, in the rover's own axes."""
-
-    forward: float = 0.0  # m
-    right: float = 0.0  # m
-    turn: float = 0.0  # rad, clockwise
-
-
-@dataclass(frozen=True, slots=True)
-class Reboot:
-    """A restart of the autopilot."""
-
-
-@dataclass(frozen=True, slots=True)
-class Disarm:
-    """Disarming at the rover, by a person."""
-
-
-Event = Lasting | Push | Reboot | Disarm
-Words = tuple[str, ...]
+#: what happens at once, to a vehicle at a time
+Event = Callable[[Vehicle, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,65 +39,66 @@ class PlannedFault:
     text: str  # as given
     rover: int | None  # system id; None: every rover
     at: float  # s since the simulator started
-    event: Event
-    lasts: float | None  # s; None: for good, or a momentary event
+    event: Faults | Event
+    lasts: float = inf  # s
 
 
-def _block_wheel(words: Words, _frame: Frame) -> Event:
-    return Lasting(blocked=wheels_of(_only(words, "left, right or all")))
+def _lasts(faults: Faults) -> Callable[[Frame], Faults]:
+    return lambda _frame: faults
 
 
-def _freeze_output(words: Words, frame: Frame) -> Event:
-    output = output_of(_only(words, "the name of an output"), frame)
-    return Lasting(Faults(outputs_frozen=frozenset({output})))
+def _block_wheel(_frame: Frame, side: str) -> Faults:
+    return Faults(wheels_blocked=wheels_of(side))
 
 
-def _push(words: Words, _frame: Frame) -> Event:
-    metres, direction = _amount(words, unit="m", default="forward")
-    known = {
-        "forward": Push(forward=metres),
-        "back": Push(forward=-metres),
-        "right": Push(right=metres),
-        "left": Push(right=-metres),
-    }
-    if direction not in known:
-        raise ValueError(f"expected {', '.join(known)}, not {direction!r}")
-    return known[direction]
+def _freeze_output(frame: Frame, name: str) -> Faults:
+    return Faults(outputs_frozen=frozenset({output_of(name, frame)}))
 
 
-def _turn(words: Words, _frame: Frame) -> Event:
-    degrees, direction = _amount(words, unit="deg", default="right")
-    if direction not in ("right", "left"):
-        raise ValueError(f"expected right or left, not {direction!r}")
-    return Push(turn=radians(degrees if direction == "right" else -degrees))
+def _push(_frame: Frame, metres: str, way: str) -> Event:
+    forward, right = (float(metres) * each for each in WAYS[way])
+    return lambda vehicle, _now: vehicle.push(forward, right, 0.0)
 
 
-def _plain(event: Event) -> Callable[[Words, Frame], Event]:
-    def read(words: Words, _frame: Frame) -> Event:
-        if words:
-            raise ValueError(f"unexpected {' '.join(words)!r}")
-        return event
-
-    return read
+def _turn(_frame: Frame, degrees: str, way: str) -> Event:
+    turn = radians(float(degrees) if way == "right" else -float(degrees))
+    return lambda vehicle, _now: vehicle.push(0.0, 0.0, turn)
 
 
-#: action name: its syntax for the user, and its parser
-ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
-    "block-wheel": ("block-wheel left|right|all", _block_wheel),
-    "freeze-output": ("freeze-output left|right (ackermann: throttle|steering)", _freeze_output),
-    "lose-gps": ("lose-gps", _plain(Lasting(Faults(gps_lost=True)))),
-    "breach-fence": ("breach-fence", _plain(Lasting(Faults(outside_fence=True)))),
-    "freeze-position": ("freeze-position", _plain(Lasting(Faults(position_frozen=True)))),
-    "cut-link": ("cut-link", _plain(Lasting(Faults(silent=True, deaf=True)))),
-    "push": ("push 0.5 m forward|back|left|right", _push),
-    "turn": ("turn 30 deg right|left", _turn),
-    "reboot": ("reboot", _plain(Reboot())),
-    "disarm": ("disarm", _plain(Disarm())),
+def _reboot(_frame: Frame) -> Event:
+    return lambda vehicle, now: vehicle.autopilot.reboot(now=now)
+
+
+def _disarm(_frame: Frame) -> Event:
+    return lambda vehicle, now: vehicle.autopilot.operator_arm(False, now=now)
+
+
+WAYS = {"forward": (1, 0), "back": (-1, 0), "left": (0, -1), "right": (0, 1)}
+#: action name: its syntax for the user, the pattern of its arguments, and what it does
+ACTIONS: Mapping[str, tuple[str, str, Callable[..., Faults | Event]]] = {
+    "block-wheel": ("block-wheel left|right|all", "(left|right|all)", _block_wheel),
+    "freeze-output": (
+        "freeze-output left|right (ackermann: throttle|steering)",
+        r"(\w+)",
+        _freeze_output,
+    ),
+    "lose-gps": ("lose-gps", "", _lasts(Faults(gps_lost=True))),
+    "breach-fence": ("breach-fence", "", _lasts(Faults(outside_fence=True))),
+    "freeze-position": ("freeze-position", "", _lasts(Faults(position_frozen=True))),
+    "cut-link": ("cut-link", "", _lasts(Faults(silent=True, deaf=True))),
+    "push": (
+        "push 0.5 m forward|back|left|right",
+        rf"({NUMBER}) ?m ({'|'.join(WAYS)})",
+        _push,
+    ),
+    "turn": ("turn 30 deg right|left", rf"({NUMBER}) ?deg (right|left)", _turn),
+    "reboot": ("reboot", "", _reboot),
+    "disarm": ("disarm", "", _disarm),
 }
 HELP = (
-    f"cause a fault at the given time, for example '{EXAMPLE}'; repeatable."
-    f" Faults: {'; '.join(form for form, _ in ACTIONS.values())}."
-    " Prefix 'rover 2' selects one of several rovers; without 'for' the fault is permanent"
+    f"Cause a fault at the given time, for example '{EXAMPLE}'; repeatable."
+    f" Faults: {'; '.join(written for written, *_ in ACTIONS.values())}."
+    " Prefix 'rover 2' selects one of several rovers; without 'for' the fault is permanent."
 )
 
 
@@ -134,40 +110,19 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
     name = form["name"].lower()
     if name not in ACTIONS:
         raise PlanError(f"unknown fault {name!r} in {text!r}; expected one of {', '.join(ACTIONS)}")
-    written, read = ACTIONS[name]
+    written, pattern, read = ACTIONS[name]
+    rest = re.fullmatch(pattern, " ".join(form["rest"].lower().split()))
+    if rest is None:
+        raise PlanError(f"{text!r}: write: {written}")
     try:
-        event = read(tuple(form["rest"].lower().split()), frame)
+        event = read(frame, *rest.groups())
     except ValueError as error:
         raise PlanError(f"{text!r}: {error}; write: {written}") from error
-    lasts = None if form["lasts"] is None else _seconds(form["lasts"], text)
-    if lasts is not None and not isinstance(event, Lasting):
+    lasts = float(form["lasts"] or inf)
+    if form["lasts"] is not None and not isinstance(event, Faults):
         raise PlanError(f"{text!r}: {name} is over at once, leave out 'for'")
     rover = None if form["rover"] is None else int(form["rover"])
-    return PlannedFault(text.strip(), rover, _seconds(form["at"], text), event, lasts)
-
-
-def _seconds(number: str, text: str) -> float:
-    try:
-        return float(number)
-    except ValueError:
-        raise PlanError(f"{text!r}: {number!r} is not a number of seconds") from None
-
-
-def _only(words: Words, what: str) -> str:
-    if len(words) != 1:
-        raise ValueError(f"expected {what}")
-    return words[0]
-
-
-def _amount(words: Words, *, unit: str, default: str) -> tuple[float, str]:
-    """Return the number and the direction of "0.5 m left", "0.5m left", "left 0.5 m"."""
-    joined = re.fullmatch(
-        rf"(?:(?P<before>[a-z]+) )?(?P<number>[\d.]+) ?(?:{unit})?(?: (?P<after>[a-z]+))?",
-        " ".join(words),
-    )
-    if joined is None or (joined["before"] and joined["after"]):
-        raise ValueError("expected an amount and a direction")
-    return float(joined["number"]), joined["before"] or joined["after"] or default
+    return PlannedFault(text.strip(), rover, float(form["at"]), event, lasts)
 
 
 def check_rovers(plan: Iterable[PlannedFault], numbers: Container[int]) -> None:

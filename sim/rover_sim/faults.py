@@ -19,6 +19,7 @@ class Faults:
     not_finite: bool = False  # ATTITUDE and LOCAL_POSITION_NED contain only NaN
     clock_frozen: bool = False  # time_boot_ms stops
     outputs_frozen: frozenset[Actuator] = frozenset()  # these keep their values while armed
+    wheels_blocked: frozenset[Actuator] = frozenset()  # those of a side, or of both
     gps_lost: bool = False  # no satellites; the position lasts for some seconds
     outside_fence: bool = False  # outside the autopilot's own fence, which is enabled meanwhile
     refuse_arm: bool = False  # even if forced

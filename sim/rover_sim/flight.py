@@ -1,81 +1,49 @@
 """Modes and arming: decides at each moment what drives the rover.
 
-This file has what all makes share; the persona's ``FlightRules`` have what differs.
+``Flight`` has what all makes share; ``ardupilot_flight`` and ``px4_flight`` have how they follow
+setpoints and when they intervene. Texts and tables are in the persona.
 """
+
+import math
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavSeverity, MavState
-from rover_sim.boot import Boot
-from rover_sim.estimate import Estimate
-from rover_sim.faults import NO_FAULTS, Faults
-from rover_sim.flight_rules import FlightRules, Intervention
-from rover_sim.home import Follower
-from rover_sim.mission_storage import MissionStorage
-from rover_sim.modes import Mode, ModeNumbers
-from rover_sim.outbox import Outbox
-from rover_sim.realism import Change
-from rover_sim.route import Route, Waypoint
+from rover_sim.modes import Mode
+from rover_sim.onboard import Onboard
+from rover_sim.route import Route, Waypoint, square_around
 from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
 from rover_sim.steering import COAST, STOP, Demand
-from rover_sim.sticks import Sticks
 
 NEEDS_POSITION = (Mode.GUIDED, Mode.AUTO, Mode.RTL)
+LOOK = 1.0  # s between checks of home; ArduPilot's one_second_loop. PX4 checks in every loop
 
 
-class FlightControl:
+class Flight:
     """Mode, arming, and the resulting demand."""
 
-    def __init__(
-        self,
-        *,
-        modes: ModeNumbers,
-        rules: FlightRules,
-        missions: MissionStorage,
-        outbox: Outbox,
-        home: Destination,
-        boot: Boot,
-        sticks: Sticks,
-        follower: Follower,
-    ) -> None:
-        self.home = home
-        self.faults: Faults = NO_FAULTS
-        self.mode = modes.first
+    reposition_mode: Mode  # for the place of DO_REPOSITION
+    hold_destination: Destination | None = None  # where HOLD drives to
+
+    def __init__(self, on: Onboard) -> None:
+        self.on = on
+        self._persona = on.persona
+        self._texts = on.persona.texts
+        self.mode = self.intended = on.persona.modes.first
         self.armed = False
-        self._modes = modes
-        self._rules = rules
-        self._missions = missions
-        self._missions.complete = False
-        self._outbox = outbox
-        self._boot = boot
-        self._radio = sticks
-        self._follower = follower
+        self.setpoint: Target | None = None  # the last one in GUIDED
+        self._here = self.home = Destination(on.estimate.north, on.estimate.east)
+        self._home_is_set = False  # by a person
+        self._home_looked_at = float("-inf")
+        on.missions.complete = False
         self._route: Route | None = None
-        self._sticks = STOP
-        self._here = home  # the present position
-        self._announced = (self.mode, self.armed)
 
     def __repr__(self) -> str:
-        return f"FlightControl({self.mode.name}, {'armed' if self.armed else 'disarmed'})"
-
-    @property
-    def custom_mode(self) -> int:
-        """The mode's number, as in HEARTBEAT."""
-        return self._modes.numbers[self.mode]
-
-    @property
-    def intended_custom_mode(self) -> int:
-        """The number of the last requested mode, as in CURRENT_MODE."""
-        return self._modes.numbers[self._rules.intended(self.mode)]
-
-    @property
-    def system_status(self) -> MavState:
-        """MAV_STATE, as in HEARTBEAT."""
-        return self._rules.system_status(self.mode, armed=self.armed)
+        return f"{type(self).__name__}({self.mode.name}, {'armed' if self.armed else 'disarmed'})"
 
     @property
     def target(self) -> Target | None:
         """The target of the setpoints while they are followed, else None."""
-        return self._rules.target if self.mode is Mode.GUIDED else None
+        return self.setpoint if self.mode is Mode.GUIDED else None
 
     @property
     def destination(self) -> Destination | None:
@@ -83,169 +51,137 @@ class FlightControl:
         if self.mode is Mode.GUIDED:
             return self.target if isinstance(self.target, Destination) else None
         if self.mode is Mode.HOLD:
-            return self._rules.hold_destination
-        if self._route is not None and self._route.next is not None:
-            return self._route.next.place
-        return None
+            return self.hold_destination
+        waypoint = self._waypoint
+        return None if waypoint is None else waypoint.place
 
     @property
     def current_item(self) -> int:
         """The current mission item, for MISSION_CURRENT."""
-        waypoint = self._route.next if self._route is not None else None
+        waypoint = self._waypoint
         if self.mode is Mode.AUTO and waypoint is not None and waypoint.seq is not None:
             return waypoint.seq
-        return self._missions.current
+        return self.on.missions.current
 
-    def take_changes(self) -> Change:
-        """Return the changes since the last call."""
-        mode, armed = self._announced
-        self._announced = (self.mode, self.armed)
-        changed = Change.NOTHING if mode is self.mode else Change.MODE
-        return changed if armed is self.armed else changed | Change.ARMING
+    @property
+    def _waypoint(self) -> Waypoint | None:
+        return self._route.next if self._route is not None else None
 
-    def request_mode(self, mode: Mode, *, now: float) -> bool:
+    # requests of clients
+
+    def request_mode(self, mode: Mode) -> bool:
         """Change the mode for a client; return False if refused."""
         refusal = None
-        if self.mode is not Mode.INITIALISING or not self._boot.takes_modes(now=now):
-            refusal = self._rules.mode_refusal(mode, self.mode, armed=self.armed, now=now)
-        if self.faults.refuse_mode:
+        starts = Mode.INITIALISING in (mode, self.mode)
+        if self.mode is Mode.INITIALISING and self.on.boot.takes_modes(self.on.now):
+            starts = False
+        if self.on.outbox.faults.refuse_mode or starts:
             refusal = "Flight mode change failed"
+        elif self.armed and not self.can_run(mode):
+            refusal = self._named("cannot_switch", mode)
         if refusal is not None:
-            self._outbox.say(MavSeverity.WARNING, refusal)
+            self.on.outbox.say(MavSeverity.WARNING, refusal)
             return False
         self.enter(mode)
         return True
 
-    def request_custom_mode(self, custom_mode: int, *, now: float) -> bool:
+    def request_custom_mode(self, custom_mode: int) -> bool:
         """Change the mode for a client, by its number; return False if refused."""
-        mode = self._modes.mode_of(custom_mode)
+        mode = self._persona.modes.mode_of(custom_mode)
         if mode is None:
-            self._outbox.say(MavSeverity.INFO, self._rules.unknown_mode(custom_mode))
+            self.on.outbox.inform(self._texts["no_such_mode"].format(custom_mode))
             return False
-        return self.request_mode(mode, now=now)
+        return self.request_mode(mode)
 
-    def enter(self, mode: Mode) -> None:
-        """Change the mode, without checks."""
-        self._rules.choose(mode)
-        self._switch(mode)
-
-    def skip_to_item(self, seq: int) -> bool:
-        """Continue with another mission item, now or on the next AUTO; return False if refused."""
-        if not self._missions.move_to(seq):
-            return False
-        if self.mode is Mode.AUTO and self._route is not None and self._missions.item_count > 0:
-            self._route.skip_to(seq)
-        return True
-
-    def reposition(
-        self, destination: Destination | None, *, keeps_place: bool = False, now: float
-    ) -> bool:
+    def reposition(self, place: Destination | None, *, keeps_place: bool = False) -> bool:
         """Drive to a place (None: stay) in the reposition mode; return False if refused.
 
         ``keeps_place``: drive on to the previous place, if there is one.
         """
-        mode = self._rules.reposition_mode
-        if self.mode is not mode and not self.request_mode(mode, now=now):
+        if not self.can_reposition and not self.request_mode(self.reposition_mode):
             return False
-        self._rules.choose(mode)
+        self.choose(self.reposition_mode)
         if not keeps_place:
-            self._rules.go_to(destination, now=now)
+            self.go_to(place)
         return True
 
     @property
     def can_reposition(self) -> bool:
         """Whether the rover is in the mode in which it drives to a place."""
-        return self.mode is self._rules.reposition_mode
+        return self.mode is self.reposition_mode
 
-    def change_speed(self, speed: float) -> bool:
-        """Change the speed of the modes that drive by themselves; return False if refused."""
-        return self._rules.change_speed(speed, self.mode)
-
-    def arm(self, *, forced: bool, now: float) -> bool:
+    def arm(self, *, forced: bool) -> bool:
         """Arm for a client; return success. ``forced`` skips the make's checks, not faults."""
         if self.armed:
             return True
-        if self.faults.refuse_arm:
-            self._outbox.say(MavSeverity.CRITICAL, "Arm: refused by a simulated fault")
-            return False
-        not_ready = () if forced else self._boot.arming_refusal(now=now)
-        for text in not_ready:
-            self._outbox.say(MavSeverity.CRITICAL, text)
-        if not_ready:
-            return False
-        if self.faults.gps_lost:
-            self._outbox.say(MavSeverity.CRITICAL, self._rules.no_position_text)
-            return False
-        refusal = self._rules.arming_refusal(self.mode, forced=forced, now=now)
-        if refusal is None and not forced:
-            refusal = self._radio.arming_refusal(now=now)
-        if refusal is not None:
-            self._outbox.say(MavSeverity.CRITICAL, refusal)
-            return False
-        self.set_armed(True)
-        return True
+        refusals = self._arming_refusals(forced)
+        for text in refusals:
+            self.on.outbox.say(MavSeverity.CRITICAL, text)
+        if not refusals:
+            self.set_armed(True)
+        return not refusals
 
-    def set_armed(self, armed: bool, *, text: str | None = None) -> None:
-        """Arm or disarm, without checks. A disarmed rover coasts."""
-        if armed is not self.armed:
-            self.armed = armed
-            if armed and self._follower.follows_arming:
-                self.home = self._here
-            self._rules.choose(self.mode)
-            self._outbox.say(MavSeverity.INFO, text or self._rules.arming_text(armed=armed))
+    def _arming_refusals(self, forced: bool) -> tuple[str, ...]:
+        on, times = self.on, self.on.realism.boot
+        if on.outbox.faults.refuse_arm:
+            return ("Arm: refused by a simulated fault",)
+        if not forced and (refusals := on.boot.arming_refusal(on.now)):
+            return refusals
+        if on.outbox.faults.gps_lost:
+            return (self._texts["no_position"],)
+        if not forced and times.is_none and on.now - on.started < times.armable:
+            return (self._texts["settling"],)
+        if not self.can_run(self.mode):
+            return (self._named("cannot_run", self.mode),)
+        refusal = None if forced else on.sticks.arming_refusal()
+        return () if refusal is None else (refusal,)
+
+    def _named(self, text: str, mode: Mode) -> str:
+        return self._texts[text].format(self._texts[mode.value])
+
+    def skip_to_item(self, seq: int) -> bool:
+        """Continue with another mission item, now or on the next AUTO; return False if refused."""
+        if not self.on.missions.move_to(seq):
+            return False
+        if self.mode is Mode.AUTO and self._route is not None and self.on.missions.item_count > 0:
+            self._route.skip_to(seq)
+        return True
 
     def set_home(self, place: Destination | None) -> None:
         """Set home to a place; None sets it to the rover's position."""
-        self._follower.name(here=place is None)
+        self._home_is_set = self._persona.home.here_is_kept or place is not None
         self.home = place or self._here
 
-    def set_sticks(self, speed: float, yaw_rate: float) -> None:
-        """Drive manually; has an effect only in MANUAL and POSITION."""
-        self._sticks = Demand(speed, yaw_rate)
-        self._rules.sticks_present = True
+    # changes without checks
 
-    def hear_heartbeat(self, system_id: int, *, now: float) -> None:
-        """Note a heartbeat from any system."""
-        self._rules.hear_heartbeat(system_id, now=now)
+    def enter(self, mode: Mode) -> None:
+        """Change the mode, without checks."""
+        self.choose(mode)
+        self._switch(mode)
+
+    def set_armed(self, armed: bool, *, text: str = "") -> None:
+        """Arm or disarm, without checks. A disarmed rover coasts."""
+        if armed is not self.armed:
+            self.armed = armed
+            if armed and self._persona.home.where_armed and not self._home_is_set:
+                self.home = self._here
+            self.choose(self.mode)
+            self.on.outbox.inform(text or self._texts["armed" if armed else "disarmed"])
 
     def lose_position(self) -> None:
-        """Note the loss of the position; the rules end a mode that needs one."""
+        """End a mode that needs a position."""
         if self.armed and self.mode in NEEDS_POSITION:
-            self._intervene(self._rules.position_lost())
+            self._fail_to(self._persona.position_lost, self._texts["position_lost"])
 
     def leave_fence(self) -> None:
         """Note that the rover left its own fence."""
         if self.armed:
-            self._intervene(self._rules.fence_breached())
+            self._fail_to(Mode.HOLD, self._texts["fence_breached"])
 
-    def take_local(self, message: Local, estimate: Estimate, *, now: float) -> None:
-        """Take SET_POSITION_TARGET_LOCAL_NED."""
-        self._rules.take_local(message, estimate, mode=self.mode, now=now)
-
-    def take_global(self, message: Global, estimate: Estimate, *, now: float) -> None:
-        """Take SET_POSITION_TARGET_GLOBAL_INT."""
-        self._rules.take_global(message, estimate, mode=self.mode, now=now)
-
-    def demand(self, estimate: Estimate, *, now: float) -> Demand:
-        """Return the demand. Call once per control step: it also advances time-outs."""
-        self._pass_time(now)
-        self._here = Destination(estimate.north, estimate.east)
-        if not self.armed:
-            self.home = self._follower.moved(self.home, estimate, now=now)
-        match self.mode:
-            case Mode.INITIALISING:
-                return COAST
-            case Mode.MANUAL | Mode.POSITION:
-                demand = self._radio.demand(now=now) or self._sticks
-            case Mode.HOLD | Mode.LAND:
-                demand = self._rules.hold(estimate)
-            case Mode.GUIDED:  # called also while disarmed, so that its time-out runs
-                demand = self._rules.follow_setpoints(estimate, now=now)
-                if isinstance(self.target, Heading | TurnRate):
-                    demand = self._radio.nudged(demand, now=now)
-            case Mode.AUTO | Mode.RTL:
-                demand = self._follow_route(estimate) if self.armed else STOP
-        return demand if self.armed else COAST
+    def _fail_to(self, mode: Mode, text: str) -> None:
+        self.on.outbox.say(MavSeverity.CRITICAL, text)
+        self.intended = mode  # so that PX4 does not re-enter OFFBOARD by itself
+        self._switch(mode)
 
     def _switch(self, mode: Mode) -> None:
         """Switch the mode; re-entering the present mode changes nothing, not even a target."""
@@ -253,46 +189,127 @@ class FlightControl:
             return
         self.mode = mode
         self._route = None
-        self._sticks = STOP
-        self._rules.enter(mode)
+        self.begin(mode)
+        missions = self.on.missions
         if mode is Mode.AUTO:
-            if self._missions.complete:
-                self._missions.move_to(0)
-            self._missions.complete = False
-            self._route = self._rules.mission_route(self.home)
+            if missions.complete:
+                missions.move_to(0)
+            missions.complete = False
+            self._route = missions.route()
+            if self._route is not None:
+                self._route.skip_to(missions.current)
+            elif self._persona.drives_square:
+                self._route = square_around(self.home)
         elif mode is Mode.RTL:
-            self._route = Route((Waypoint(None, self.home),), loop=False)
+            self._route = Route((Waypoint(None, self.home),))
 
-    def _pass_time(self, now: float) -> None:
-        self._rules.sticks_present = self._rules.sticks_present or self._radio.is_there
-        for severity, text in self._boot.texts_due(now=now):
-            self._outbox.say(severity, text)
-        started = self.mode is Mode.INITIALISING and self._boot.is_initialised(now=now)
-        if self._boot.loses_mode(now=now) or started:
+    # each control step
+
+    def demand(self) -> Demand:
+        """Return the demand. Call once per control step: it also advances time-outs."""
+        on, estimate = self.on, self.on.estimate
+        self._pass_time()
+        self._here = Destination(estimate.north, estimate.east)
+        if not self.armed:
+            self._move_home()
+        match self.mode:
+            case Mode.INITIALISING:
+                return COAST
+            case Mode.MANUAL | Mode.POSITION:
+                demand = on.sticks.demand()
+            case Mode.HOLD | Mode.LAND:
+                demand = self.hold()
+            case Mode.GUIDED:  # called also while disarmed, so that its time-out runs
+                demand = self.follow_setpoint()
+                if isinstance(self.target, Heading | TurnRate):
+                    demand = on.sticks.nudged(demand)
+            case Mode.AUTO | Mode.RTL:
+                demand = self._follow_route() if self.armed else STOP
+        return demand if self.armed else COAST
+
+    def _pass_time(self) -> None:
+        on = self.on
+        for text in on.boot.texts_due(on.now):
+            on.outbox.inform(text)
+        started = self.mode is Mode.INITIALISING and on.boot.is_initialised(on.now)
+        if on.boot.loses_mode(on.now) or started:
             self.enter(Mode.MANUAL)
-        arrived = self._route is not None and self._route.next is None
-        intervention = self._rules.intervene(self.mode, armed=self.armed, arrived=arrived, now=now)
-        self._intervene(intervention)
+        self.watch(arrived=self._route is not None and self._route.next is None)
 
-    def _intervene(self, intervention: Intervention | None) -> None:
-        if intervention is None:
+    def _move_home(self) -> None:
+        """Let home follow a disarmed rover, until a person has set it."""
+        if self._home_is_set or self.on.now - self._home_looked_at < LOOK:
             return
-        if intervention.mode is not None:
-            self._switch(intervention.mode)
-        if intervention.disarm:
-            self.set_armed(False, text=intervention.disarm_text)
+        self._home_looked_at = self.on.now
+        here, home = self._here, self.home
+        distance = math.hypot(here.north - home.north, here.east - home.east)
+        if distance >= self._persona.home.least_move:
+            self.home = here
 
-    def _follow_route(self, estimate: Estimate) -> Demand:
-        if self._route is None:
+    def _follow_route(self) -> Demand:
+        route, waypoint, missions = self._route, self._waypoint, self.on.missions
+        if route is None or waypoint is None:
             return STOP
-        steer, cruise_speed = self._rules.steer_to, self._rules.cruise_speed
-        demand, reached = self._route.demand(estimate, cruise_speed, steer)
-        if reached is not None and reached.seq is not None:
-            self._outbox.send(messages.MissionItemReached(reached.seq))
-            following = self._route.next
-            if following is None:
-                self._missions.complete = True
-                self._outbox.say(MavSeverity.INFO, "Mission Complete")
-            elif following.seq is not None:
-                self._missions.move_to(following.seq)
-        return demand
+        demand = self.steer_to(waypoint.place)
+        if demand is not None:
+            return demand
+        route.advance()
+        if waypoint.seq is not None:
+            self.on.outbox.send(messages.MissionItemReached(waypoint.seq))
+            if route.next is None:
+                missions.complete = True
+                self.on.outbox.inform("Mission Complete")
+            elif route.next.seq is not None:
+                missions.move_to(route.next.seq)
+        return STOP
+
+    # what each make does in its own way
+
+    def choose(self, mode: Mode) -> None:
+        """Note a requested mode, even if it is the present one."""
+        self.intended = mode
+
+    def can_run(self, mode: Mode) -> bool:
+        """Return whether a mode can be entered armed, or the rover armed in it."""
+        del mode
+        return True
+
+    def hear_heartbeat(self, system_id: int) -> None:
+        """Note a heartbeat from any system."""
+
+    @property
+    def system_status(self) -> MavState:
+        """MAV_STATE, as in HEARTBEAT."""
+        raise NotImplementedError
+
+    def begin(self, mode: Mode) -> None:
+        """Begin a mode, no matter who requested it."""
+        raise NotImplementedError
+
+    def watch(self, *, arrived: bool) -> None:
+        """Check the time-outs; ``arrived``: AUTO or RTL has reached the end of its route."""
+        raise NotImplementedError
+
+    def take(self, message: Local | Global) -> None:
+        """Take a setpoint, in any mode."""
+        raise NotImplementedError
+
+    def go_to(self, place: Destination | None) -> None:
+        """Take the place of DO_REPOSITION, in ``reposition_mode``; None: stay here."""
+        raise NotImplementedError
+
+    def change_speed(self, speed: float) -> bool:
+        """Take DO_CHANGE_SPEED, m/s; return False if refused."""
+        raise NotImplementedError
+
+    def follow_setpoint(self) -> Demand:
+        """Return the demand in GUIDED."""
+        raise NotImplementedError
+
+    def steer_to(self, place: Destination) -> Demand | None:
+        """Return the demand in AUTO and RTL; None on arrival."""
+        raise NotImplementedError
+
+    def hold(self) -> Demand:
+        """Return the demand in HOLD."""
+        raise NotImplementedError

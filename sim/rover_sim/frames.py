@@ -1,6 +1,5 @@
-"""How a rover steers: the geometry of its wheels, and the make's parameters for it."""
+"""How a rover steers: the geometry of its wheels."""
 
-from collections.abc import Mapping
 from enum import Enum
 
 WHEEL_BASE = 0.4  # m between the axles, as in both URDFs
@@ -21,11 +20,3 @@ class Frame(Enum):
     def turns_on_the_spot(self) -> bool:
         """Whether the rover can turn without rolling."""
         return self is not Frame.ACKERMANN
-
-
-#: ArduPilot, SERVOn_FUNCTION: 26 ground steering and 70 throttle, or 73 left and 74 right
-ARDUPILOT_FRAMES: Mapping[Frame, Mapping[str, float]] = {
-    Frame.SKID: {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74},
-    Frame.DIFFERENTIAL: {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74},
-    Frame.ACKERMANN: {"SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70},
-}

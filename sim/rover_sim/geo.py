@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 
 METRES_PER_DEGREE = 111_318.84502145034  # ArduPilot's LOCATION_SCALING_FACTOR
-LATITUDE_LIMIT_DEGE7 = 900_000_000
-LONGITUDE_LIMIT_DEGE7 = 1_800_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,14 +15,9 @@ class Origin:
     altitude: float
 
     @property
-    def latitude_degE7(self) -> int:
-        """The latitude in degE7."""
-        return round(self.latitude * 1e7)
-
-    @property
-    def longitude_degE7(self) -> int:
-        """The longitude in degE7."""
-        return round(self.longitude * 1e7)
+    def in_degrees_e7(self) -> tuple[int, int]:
+        """Latitude and longitude in degE7."""
+        return round(self.latitude * 1e7), round(self.longitude * 1e7)
 
     def to_global(self, north: float, east: float) -> tuple[int, int]:
         """Return latitude and longitude in degE7."""
@@ -38,9 +31,10 @@ class Origin:
         (Location::offset.) An origin computed from such a position can be 1 degE7 off.
         """
         latitude = self.latitude + north / METRES_PER_DEGREE
+        x, y = self.in_degrees_e7
         return (
-            self.latitude_degE7 + int(north / METRES_PER_DEGREE * 1e7),
-            self.longitude_degE7 + int(east / self._metres_per_degree_east(latitude) * 1e7),
+            x + int(north / METRES_PER_DEGREE * 1e7),
+            y + int(east / self._metres_per_degree_east(latitude) * 1e7),
         )
 
     def to_local(self, latitude_degE7: int, longitude_degE7: int) -> tuple[float, float]:
@@ -54,6 +48,11 @@ class Origin:
     def _metres_per_degree_east(self, latitude: float) -> float:
         """Return metres per degree of longitude, at the mean of the origin's and this latitude."""
         return METRES_PER_DEGREE * math.cos(math.radians((self.latitude + latitude) / 2))
+
+
+def is_on_earth(latitude_degE7: float, longitude_degE7: float) -> bool:
+    """Return whether these are coordinates; NaN is none."""
+    return abs(latitude_degE7) <= 900_000_000 and abs(longitude_degE7) <= 1_800_000_000
 
 
 DEFAULT_ORIGIN = Origin(-35.363262, 149.165237, 584.0)  # where ArduPilot's SITL starts

@@ -38,4 +38,4 @@ class KinematicBody(PlanarBody):
     def _next_yaw_rate(self, speed: float, dt: float) -> float:
         del speed
         wanted = self._demanded_yaw_rate
-        return approach(self._yaw_rate, wanted, self.lag, MAX_YAW_ACCELERATION, dt)
+        return approach(self.state.yaw_rate, wanted, self.lag, MAX_YAW_ACCELERATION, dt)

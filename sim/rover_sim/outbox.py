@@ -21,9 +21,6 @@ class Outbox:
         self._long_texts = 0  # id of the last text that needed more than one STATUSTEXT
         self._late: list[tuple[float, Message]] = []  # (time to send, message), earliest first
 
-    def __repr__(self) -> str:
-        return f"Outbox({len(self._messages)} waiting)"
-
     def send(self, message: Message) -> None:
         """Add a message, unless a fault withholds it."""
         # Not .id: in BATTERY_STATUS and STATUSTEXT a field of that name hides the message's.
@@ -43,7 +40,7 @@ class Outbox:
         """Add a STATUSTEXT of severity INFO."""
         self.say(MavSeverity.INFO, text)
 
-    def send_at(self, message: Message, at: float, *, now: float) -> None:
+    def send_at(self, message: Message, at: float, now: float) -> None:
         """Add a message at time ``at``; the owner of the clock calls ``release``."""
         if at <= now:
             self.send(message)
@@ -56,7 +53,7 @@ class Outbox:
         """Time at which ``release`` is due; infinity if nothing is delayed."""
         return self._late[0][0] if self._late else math.inf
 
-    def release(self, *, now: float) -> None:
+    def release(self, now: float) -> None:
         """Add the delayed messages that are due."""
         while self._late and self._late[0][0] <= now:
             self.send(self._late.pop(0)[1])

@@ -1,17 +1,17 @@
 """The autopilot's parameters and the parameter protocol, vehicle side.
 
-MAVLink guide, "Parameter Protocol"; the persona's ``ParameterProtocol`` encodes the values.
-Requests for an unknown name get no answer, as from the real autopilots.
+MAVLink guide, "Parameter Protocol". Requests for an unknown name get no answer, as from the real
+autopilots.
 """
 
-from collections.abc import Iterable, Mapping
+import math
 from dataclasses import dataclass
-from typing import Protocol
+from struct import pack, unpack
+from zlib import crc32
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
-from rover_sim.dispatch import Handler
-from rover_sim.outbox import Outbox
+from rover_sim.onboard import Onboard
 
 INT8, INT16, UINT32, INT32, REAL32 = 2, 4, 5, 6, 9  # MAV_PARAM_TYPE
 BY_NAME = -1  # param_index in a request
@@ -28,51 +28,22 @@ class Parameter:
     type: int = REAL32
 
 
-class ParameterProtocol(Protocol):
-    """How one make encodes PARAM_VALUE and decodes PARAM_SET."""
-
-    tells_index: bool  # also in answers to PARAM_SET and to reads by name
-
-    def to_wire(self, value: float, type_: int) -> float:
-        """Return the value as PARAM_VALUE carries it."""
-        ...
-
-    def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
-        """Return the value of a PARAM_SET, sent as ``type_`` for a parameter of ``own_type``.
-
-        None: the make rejects it.
-        """
-        ...
-
-    answers_untaken: bool  # a rejected PARAM_SET is answered with the old value
-
-    def digest(self, parameters: Iterable[tuple[Parameter, float]]) -> int | None:
-        """Return _HASH_CHECK's value, or None if this make has none."""
-        ...
+WIRE_FORMATS = {INT32: "<i", UINT32: "<I", REAL32: "<f"}  # of bytewise makes
 
 
 class Parameters:
     """The values, and the handlers of the parameter messages. They survive a reboot."""
 
-    def __init__(
-        self,
-        parameters: Iterable[Parameter],
-        protocol: ParameterProtocol,
-        outbox: Outbox,
-    ) -> None:
-        self._listed = tuple(parameters)
-        self._protocol = protocol
+    def __init__(self, on: Onboard) -> None:
+        """A ``bytewise`` persona's integers travel as their bytes, as on PX4, not as numbers.
+
+        Such a make ignores a PARAM_SET of another type than the parameter's, names the index in
+        each answer, and sends a hash over the list.
+        """
+        self._listed, self._bytewise = on.persona.parameters, on.persona.bytewise
         self._indices = {each.name: index for index, each in enumerate(self._listed)}
         self._values = {each.name: each.value for each in self._listed}
-        self._outbox = outbox
-        self.handlers: Mapping[int, Handler] = {
-            messages.ParamRequestList.id: self._handle_request_list,
-            messages.ParamRequestRead.id: self._handle_request_read,
-            messages.ParamSet.id: self._handle_set,
-        }
-
-    def __repr__(self) -> str:
-        return f"Parameters({len(self._listed)})"
+        self._outbox = on.outbox
 
     def __contains__(self, name: str) -> bool:
         return name in self._values
@@ -90,54 +61,63 @@ class Parameters:
         self[name] = value
         self._send(self._indices[name], UNNUMBERED)
 
-    def _handle_request_list(
-        self, _message: messages.ParamRequestList, _sender: Address, _now: float
-    ) -> None:
-        self._send_digest()  # PX4 sends its hash first (mavlink_parameters.cpp)
+    def on_param_request_list(self, _message: messages.ParamRequestList, _sender: Address) -> None:
+        """Send the list."""
+        self._send_hash()  # PX4 sends its hash first (mavlink_parameters.cpp)
         for index in range(len(self._listed)):
             self._send(index, index)
 
-    def _handle_request_read(
-        self, message: messages.ParamRequestRead, _sender: Address, _now: float
-    ) -> None:
+    def on_param_request_read(self, message: messages.ParamRequestRead, _sender: Address) -> None:
+        """Send a parameter, by its index or its name."""
         index, name = message.param_index, _name_of(message.param_id)
         if 0 <= index < len(self._listed):
             self._send(index, index)
         elif index == BY_NAME and name == HASH_CHECK:
-            self._send_digest()
+            self._send_hash()
         elif index == BY_NAME and name in self._indices:
             self._answer(self._indices[name])
 
-    def _handle_set(self, message: messages.ParamSet, _sender: Address, _now: float) -> None:
+    def on_param_set(self, message: messages.ParamSet, _sender: Address) -> None:
         """Answer with the stored value, even if it is unchanged."""
         index = self._indices.get(_name_of(message.param_id))
         if index is None:
             return
-        own = self._listed[index]
-        value = self._protocol.from_wire(message.param_value, message.param_type, own.type)
-        if value is not None:
+        own, value = self._listed[index], message.param_value
+        if self._bytewise and own.type != message.param_type:
+            return
+        if self._bytewise and own.type != REAL32:
+            (self[own.name],) = unpack(WIRE_FORMATS[own.type], pack("<f", value))
+        elif math.isfinite(value):
             self[own.name] = value
-        elif not self._protocol.answers_untaken:
+        elif self._bytewise:
             return
         self._answer(index)
 
     def _answer(self, index: int) -> None:
-        self._send(index, index if self._protocol.tells_index else UNNUMBERED)
+        self._send(index, index if self._bytewise else UNNUMBERED)
 
     def _send(self, index: int, told: int) -> None:
         own = self._listed[index]
-        value = self._protocol.to_wire(self._values[own.name], own.type)
-        self._outbox.send(
-            messages.ParamValue(own.name.encode(), value, own.type, len(self._listed), told)
-        )
+        self._tell(own.name, self._values[own.name], own.type, told)
 
-    def _send_digest(self) -> None:
-        digest = self._protocol.digest((each, self._values[each.name]) for each in self._listed)
-        if digest is None:
+    def _tell(self, name: str, value: float, type_: int, told: int) -> None:
+        if self._bytewise:
+            (value,) = unpack("<f", _bytes_of(value, type_))
+        count = len(self._listed)
+        self._outbox.send(messages.ParamValue(name.encode(), value, type_, count, told))
+
+    def _send_hash(self) -> None:
+        if not self._bytewise:
             return
-        value = self._protocol.to_wire(digest, UINT32)
-        name, count = HASH_CHECK.encode(), len(self._listed)
-        self._outbox.send(messages.ParamValue(name, value, UINT32, count, UNNUMBERED))
+        digest = 0
+        for each in self._listed:
+            value = _bytes_of(self._values[each.name], each.type)
+            digest = crc32(each.name.encode() + value, digest)
+        self._tell(HASH_CHECK, digest, UINT32, UNNUMBERED)
+
+
+def _bytes_of(value: float, type_: int) -> bytes:
+    return pack(WIRE_FORMATS[type_], value if type_ == REAL32 else int(value))
 
 
 def _name_of(param_id: str | bytes) -> str:

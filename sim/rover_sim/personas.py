@@ -1,50 +1,78 @@
-"""The differences between makes of autopilot: numbers, names and strategies.
+"""The differences between makes of autopilot, as data: ``assets/ardupilot.toml`` and ``px4.toml``.
 
 ``ardupilot`` is Rover 4.6.3 as observed on the wire; ``px4`` is a rover on PX4 1.17, from its
-sources and as observed; ``generic`` speaks as PX4 does. A persona names objects (flight rules,
-commands, conventions) for the behaviour that differs; no code tests its name.
+sources and as observed; ``generic`` speaks as PX4 does. Only flight and drive train are code of
+their own (``stack``); no code tests a persona's name.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, is_dataclass, replace
+from enum import Enum
+from functools import cache
+from itertools import repeat
+from pathlib import Path
+from types import UnionType
+from typing import Any, cast, get_args, get_origin, get_type_hints
 
 from mav_tasks.mavlink import messages
-from mav_tasks.mavlink.enums import MavAutopilot, MavLandedState, MavModeFlag
-from rover_sim.ardupilot_commands import ardupilot_commands
-from rover_sim.ardupilot_parameters import Cast, ardupilot_parameters
-from rover_sim.ardupilot_rules import ArduPilotRules
-from rover_sim.available_modes import PX4_OFFERED, OfferedMode
-from rover_sim.boot import ARDUPILOT_SCRIPT, PX4_SCRIPT, BootScript
-from rover_sim.commands import CommandParts, CommandTable
-from rover_sim.drive_train import DriveTrain, ardupilot_drive, px4_drive
-from rover_sim.flight_rules import FlightParts, FlightRules
+from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavLandedState, MavResult
+from rover_sim.boot import BootScript
 from rover_sim.frames import Frame
-from rover_sim.home import ARDUPILOT_HOME, PX4_HOME, HomeRule
-from rover_sim.mission_conventions import ARDUPILOT_MISSIONS, PX4_MISSIONS, MissionConventions
+from rover_sim.mission_storage import MissionConventions
 from rover_sim.modes import Mode as Mode
 from rover_sim.modes import ModeNumbers
-from rover_sim.parameters import INT32, Parameter, ParameterProtocol, Parameters
-from rover_sim.px4_commands import px4_commands
-from rover_sim.px4_parameters import Bytewise, px4_parameters
-from rover_sim.px4_rules import Px4Rules
+from rover_sim.parameters import INT8, INT16, INT32, REAL32, Parameter
 from rover_sim.realism import (
-    ARDUPILOT_BOOT,
-    ARDUPILOT_ESTIMATOR,
-    ARDUPILOT_REALISM,
-    PUSHING,
-    PX4_BOOT,
-    PX4_ESTIMATOR,
-    PX4_REALISM,
-    STICK_SPEEDS,
+    SHORT,
     BootTimes,
     EstimatorError,
     Gps,
+    LinkTiming,
     PushingError,
     Realism,
 )
-from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
+from rover_sim.streams import StreamTable
 
-GEOFENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot reports it healthy unless it is breached
+ASSETS = Path(__file__).parent / "assets"
+TYPES = {"int8": INT8, "int16": INT16, "int32": INT32}
+
+
+@dataclass(frozen=True, slots=True)
+class OfferedMode:
+    """One mode as a client displays it."""
+
+    mode: Mode
+    standard: int  # MAV_STANDARD_MODE
+    name: str  # empty for a standard mode: the client names it
+    properties: int  # MAV_MODE_PROPERTY
+
+
+@dataclass(frozen=True, slots=True)
+class HomeRule:
+    """Conditions in which one make moves home, as on the real autopilots.
+
+    From the sources of ArduPilot Rover 4.6 (commands.cpp, update_home) and PX4 1.17
+    (HomePosition.cpp): while disarmed, home follows the rover. DO_SET_HOME fixes it: on ArduPilot
+    in either form, until a restart; on PX4 only with a place, not with "here". Not imitated: PX4
+    forgets such a place when it corrects home's altitude, by more than 1 m and within 120 s of an
+    arming.
+    """
+
+    where_armed: bool  # sets home at each arming
+    least_move: float  # m; while disarmed, home follows a rover that is at least this far away
+    here_is_kept: bool  # DO_SET_HOME with "here" also fixes home
+    nowhere_is_here: bool  # DO_SET_HOME to 0/0 is the rover's position, not refused
+    is_told: bool  # HOME_POSITION is sent when home moves; else only as it streams
+
+
+@dataclass(frozen=True, slots=True)
+class FrameTraits:
+    """What depends on the frame."""
+
+    parameters: tuple[Parameter, ...]
+    stick_speed: float | None = None  # m/s at full throttle, in GUIDED; None: ignored
+    pushing: PushingError | None = None  # additional estimation error
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,195 +82,123 @@ class Persona:
     name: str
     autopilot: MavAutopilot
     modes: ModeNumbers
-    offered_modes: tuple[OfferedMode, ...]  # AVAILABLE_MODES; empty: it sends no such list
     mode_flags: Mapping[Mode, int]  # HEARTBEAT.base_mode, without SAFETY_ARMED
+    offered_modes: tuple[OfferedMode, ...]  # AVAILABLE_MODES; empty: it sends no such list
     capabilities: int  # AUTOPILOT_VERSION.capabilities
     flight_sw_version: int  # AUTOPILOT_VERSION: major, minor, patch, type, a byte each
-    firmware_hash: bytes  # AUTOPILOT_VERSION.flight_custom_version, 8 bytes
+    firmware_hash: str  # AUTOPILOT_VERSION.flight_custom_version, 8 characters
     heeds_component: bool  # ignores messages to another component of its system
     also_healthy: int  # SYS_STATUS: sensors reported healthy although not present
-    landed_state_armed: MavLandedState  # EXTENDED_SYS_STATE while armed
+    enables_prearm: bool  # SYS_STATUS: the pre-arm check is present and enabled, not only healthy
+    landed_states: tuple[MavLandedState, MavLandedState]  # EXTENDED_SYS_STATE: armed, disarmed
     no_mission_total: int  # MISSION_CURRENT.total if no mission is stored
     lacks: frozenset[int]  # ids of messages that this make cannot send
+    accepted_in_silence: frozenset[int]  # ids of REQUEST_MESSAGE: accepted, but not sent
     streams: StreamTable
-    rules: Callable[[FlightParts], FlightRules]
-    commands: Callable[[CommandParts], CommandTable]
+    stack: str  # whose flight and drive train
+    commands: Mapping[int, str]  # by MAV_CMD: a method of Commands, a MAV_RESULT, "": no answer
+    results: Mapping[str, MavResult]  # of what is refused
+    set_mode_acked_as: int  # the command id in the COMMAND_ACK of the message SET_MODE
+    force_arm: tuple[float, ...]  # param2 of COMPONENT_ARM_DISARM that skips the checks
+    texts: Mapping[str, str]  # also the names of modes; empty: nothing is said
+    position_lost: Mode  # entered if the position is lost in a mode that needs it
+    drives_square: bool  # in AUTO without a mission
     missions: MissionConventions
-    parameter_protocol: ParameterProtocol
-    parameters: tuple[Parameter, ...]
-    parameters_of: Callable[[Frame], tuple[Parameter, ...]]
+    #: integer parameters are sent as their bytes in a float, not as numbers; the list is sorted,
+    #: and has a hash
+    bytewise: bool
     system_id_parameter: str  # name of the parameter with the system id
     speed_parameter: str  # name of the parameter with the speed limit, m/s
     honours_yaw_rate: bool  # of a setpoint; only PX4's rules use it, ArduPilot always honours it
-    realism: Realism  # the default realism
-    estimators: Mapping[Gps, EstimatorError]
-    pushing: PushingError | None  # additional estimation error, on an Ackermann rover
     boot: BootTimes  # in real time
+    timing: LinkTiming
     boot_script: BootScript
     home: HomeRule
-    tells_no_landed_state: bool  # EXTENDED_SYS_STATE: always undefined
-    shows_prearm_in_health_only: bool  # SYS_STATUS
-    accepted_in_silence: frozenset[int]  # ids of REQUEST_MESSAGE: accepted, but not sent
     answers_first_peer: bool  # on a socket, and no other peer until it restarts
-    runtime_parameter: Parameter | None  # counts its seconds of runtime
+    estimators: Mapping[Gps, EstimatorError]
+    realism: Realism  # the default realism
+    frames: Mapping[Frame, FrameTraits]
     frame: Frame  # how it steers
-    drive: Callable[[Frame, Parameters], DriveTrain]
+    parameters: tuple[Parameter, ...]
+    #: COM_OBL_RC_ACT and NAV_RCL_ACT: a mode, or disarm. A mode of the sticks needs them; without,
+    #: the second table applies
+    offboard_loss: Mapping[int, str] = field(default_factory=dict)
+    stick_loss: Mapping[int, str] = field(default_factory=dict)
+    runtime_parameter: str | None = None  # counts its seconds of runtime, and is sent unasked
 
     def on(self, frame: Frame) -> "Persona":
         """Return the same make on another frame; its parameters identify the frame."""
-        pushing = self.pushing if frame is Frame.ACKERMANN else None
-        realism, own = self.realism, self.realism.estimator
-        adds_speed = realism.stick_speed is not None
+        own = self.frames[frame if frame is Frame.ACKERMANN else Frame.SKID]
+        estimators = {
+            gps: replace(error, pushing=own.pushing) for gps, error in self.estimators.items()
+        }
         return replace(
             self,
             frame=frame,
-            parameters=self.parameters_of(frame),
-            estimators={gps: replace(e, pushing=pushing) for gps, e in self.estimators.items()},
+            parameters=own.parameters,
+            estimators=estimators,
             realism=replace(
-                realism,
-                estimator=own and replace(own, pushing=pushing),
-                stick_speed=STICK_SPEEDS[frame] if adds_speed else None,
+                self.realism, estimator=estimators[Gps.FINE], stick_speed=own.stick_speed
             ),
         )
 
 
-ARDUPILOT = Persona(
-    name="ardupilot",
-    autopilot=MavAutopilot.ARDUPILOTMEGA,
-    modes=ModeNumbers(
-        {
-            Mode.MANUAL: 0,
-            Mode.HOLD: 4,
-            Mode.AUTO: 10,
-            Mode.RTL: 11,
-            Mode.GUIDED: 15,
-            Mode.INITIALISING: 16,
-        },
-        first=Mode.INITIALISING,
-    ),
-    offered_modes=(),
-    mode_flags={
-        Mode.INITIALISING: MavModeFlag.CUSTOM_MODE_ENABLED,
-        Mode.MANUAL: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED,
-        Mode.HOLD: MavModeFlag.CUSTOM_MODE_ENABLED,
-        Mode.AUTO: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.GUIDED_ENABLED,
-        Mode.RTL: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.GUIDED_ENABLED,
-        Mode.GUIDED: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.GUIDED_ENABLED,
-    },
-    capabilities=61935,
-    flight_sw_version=4 << 24 | 6 << 16 | 3 << 8 | 255,  # 4.6.3, official
-    firmware_hash=b"3fc7011a",
-    heeds_component=False,
-    also_healthy=GEOFENCE,
-    landed_state_armed=MavLandedState.ON_GROUND,
-    no_mission_total=0,
-    lacks=frozenset(
-        {
-            messages.ProtocolVersion.id,
-            messages.CurrentMode.id,
-        }
-    ),
-    streams=ARDUPILOT_STREAMS,
-    rules=ArduPilotRules,
-    commands=ardupilot_commands,
-    missions=ARDUPILOT_MISSIONS,
-    parameter_protocol=Cast(),
-    parameters=ardupilot_parameters(Frame.SKID),
-    parameters_of=ardupilot_parameters,
-    system_id_parameter="SYSID_THISMAV",
-    speed_parameter="WP_SPEED",
-    honours_yaw_rate=True,
-    realism=ARDUPILOT_REALISM,
-    estimators=ARDUPILOT_ESTIMATOR,
-    pushing=None,
-    boot=ARDUPILOT_BOOT,
-    boot_script=ARDUPILOT_SCRIPT,
-    home=ARDUPILOT_HOME,
-    tells_no_landed_state=True,
-    shows_prearm_in_health_only=False,
-    accepted_in_silence=frozenset({280}),  # GIMBAL_MANAGER_INFORMATION without a gimbal
-    answers_first_peer=False,
-    runtime_parameter=Parameter("STAT_RUNTIME", 0, INT32),
-    frame=Frame.SKID,
-    drive=ardupilot_drive,
-)
+def _table(name: str) -> dict[str, Any]:
+    return tomllib.loads((ASSETS / f"{name}.toml").read_text(encoding="utf-8"))
 
-STICKS = MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED
-BY_ITSELF = (
-    MavModeFlag.CUSTOM_MODE_ENABLED
-    | MavModeFlag.AUTO_ENABLED
-    | MavModeFlag.STABILIZE_ENABLED
-    | MavModeFlag.GUIDED_ENABLED
-)
 
-PX4 = Persona(
-    name="px4",
-    autopilot=MavAutopilot.PX4,
-    modes=ModeNumbers(
-        {
-            Mode.MANUAL: 1 << 16,
-            Mode.POSITION: 3 << 16,
-            Mode.HOLD: 4 << 16 | 3 << 24,
-            Mode.AUTO: 4 << 16 | 4 << 24,
-            Mode.RTL: 4 << 16 | 5 << 24,
-            Mode.LAND: 4 << 16 | 6 << 24,
-            Mode.GUIDED: 6 << 16,
-        },
-        first=Mode.HOLD,  # like a SITL without sticks
-    ),
-    offered_modes=PX4_OFFERED,
-    mode_flags={
-        Mode.MANUAL: STICKS,
-        Mode.POSITION: STICKS | MavModeFlag.STABILIZE_ENABLED | MavModeFlag.GUIDED_ENABLED,
-        Mode.HOLD: BY_ITSELF,
-        Mode.AUTO: BY_ITSELF,
-        Mode.RTL: BY_ITSELF,
-        Mode.LAND: BY_ITSELF,
-        Mode.GUIDED: BY_ITSELF,
-    },
-    # MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE, FTP, SET_POSITION_TARGET_LOCAL_NED,
-    # SET_POSITION_TARGET_GLOBAL_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
-    capabilities=4 | 8 | 16 | 32 | 128 | 256 | 8192 | 16384 | 32768,
-    flight_sw_version=1 << 24 | 17 << 16 | 0 << 8 | 255,  # 1.17.0, official
-    firmware_hash=b"99c40407",
-    heeds_component=True,
-    also_healthy=0,
-    landed_state_armed=MavLandedState.IN_AIR,  # PX4's rover land detector: armed means not landed
-    no_mission_total=65535,
-    lacks=frozenset(),
-    streams=PX4_STREAMS,
-    rules=Px4Rules,
-    commands=px4_commands,
-    missions=PX4_MISSIONS,
-    parameter_protocol=Bytewise(),
-    parameters=px4_parameters(Frame.DIFFERENTIAL),
-    parameters_of=px4_parameters,
-    system_id_parameter="MAV_SYS_ID",
-    speed_parameter="RO_SPEED_LIM",
-    honours_yaw_rate=False,
-    realism=PX4_REALISM,
-    estimators=PX4_ESTIMATOR,
-    pushing=PUSHING,
-    boot=PX4_BOOT,
-    boot_script=PX4_SCRIPT,
-    home=PX4_HOME,
-    tells_no_landed_state=False,
-    shows_prearm_in_health_only=True,
-    accepted_in_silence=frozenset(),
-    answers_first_peer=True,
-    runtime_parameter=None,
-    frame=Frame.DIFFERENTIAL,
-    drive=px4_drive,
-)
+def _persona(table: dict[str, Any]) -> Persona:
+    frames = {}
+    for frame, traits in table["frames"].items():
+        values = table["parameters"] | traits["parameters"]
+        names = sorted(values) if table["bytewise"] else values
+        parameters = [_parameter(name, values[name]) for name in names]
+        frames[frame] = {**traits, "parameters": parameters}
+    boot = _value(BootTimes, table["boot"])
+    realism = {"boot": boot.scaled(SHORT), "timing": table["timing"]}
+    more = {"realism": realism, "frames": frames, "parameters": ()}
+    given: Persona = _value(Persona, {**table, **more})
+    return given.on(given.frame)
 
-#: speaks like PX4, but reports an unknown autopilot
-GENERIC = replace(
-    PX4,
-    name="generic",
-    autopilot=MavAutopilot.GENERIC,
-    flight_sw_version=1 << 24 | 255,
-    firmware_hash=bytes(8),
-    answers_first_peer=False,
-)
 
+def _parameter(name: str, value: Any) -> Parameter:
+    """Return a parameter: a decimal number, a whole one, or a table of its type and value."""
+    if isinstance(value, dict):
+        ((kind, value),) = value.items()
+        return Parameter(name, value, TYPES[kind])
+    return Parameter(name, value, REAL32 if isinstance(value, float) else INT32)
+
+
+def _value(kind: Any, given: Any) -> Any:
+    """Return what a table says as a ``kind``, part by part.
+
+    A dataclass is a table of its fields, or a list of their values; an enum's member and a
+    message's id are named.
+    """
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin is UnionType:  # or None, which a table leaves out
+        return _value(inner[0], given)
+    if origin is Mapping:
+        return {_value(inner[0], key): _value(inner[1], each) for key, each in given.items()}
+    if origin in (tuple, frozenset):
+        kinds = inner if len(inner) > 1 and inner[1] is not Ellipsis else repeat(inner[0])
+        return origin(map(_value, kinds, given))
+    if is_dataclass(kind) and isinstance(given, dict | list):
+        make = cast(Any, kind)
+        hints = _hints(make)
+        named = given.items() if isinstance(given, dict) else zip(hints, given, strict=False)
+        return make(**{name: _value(hints[name], each) for name, each in named})
+    if isinstance(given, str) and isinstance(kind, type) and issubclass(kind, Enum):
+        return kind[given.upper()]
+    if isinstance(given, str) and kind is int:
+        if given in MavCmd.__members__:
+            return MavCmd[given]
+        return int(given) if given.isdecimal() else getattr(messages, given).id
+    return given
+
+
+_hints = cache(get_type_hints)
+
+_PX4 = _table("px4")
+ARDUPILOT, PX4, GENERIC = map(_persona, (_table("ardupilot"), _PX4, _PX4 | _table("generic")))
 PERSONAS: Mapping[str, Persona] = {each.name: each for each in (ARDUPILOT, PX4, GENERIC)}

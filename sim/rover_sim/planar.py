@@ -12,6 +12,7 @@ MAX_ACCELERATION = 6.0  # m/s², the limit of tyres on dry ground
 SNAP = 1e-3  # m/s, rad/s; a smaller difference counts as reached
 LAG_SPREAD = 0.8, 1.2  # factors on the lag; a seed draws between them
 LONGEST_STEP = 0.05  # s; a longer advance is cut into equal parts
+STANDING = (0.0,) * 5  # pitch, roll, and motion
 
 
 class PlanarBody:
@@ -22,30 +23,12 @@ class PlanarBody:
 
     def __init__(self, *, start: Pose, lag: float) -> None:
         self.lag = lag
-        self._time = 0.0
-        self._north, self._east, self._yaw = start.north, start.east, wrap_angle(start.yaw)
-        self._speed = self._yaw_rate = 0.0
+        #: the state after the last ``advance``
+        self.state = BodyState(0.0, start.north, start.east, 0.0, wrap_angle(start.yaw), *STANDING)
         self._demanded_speed = 0.0
 
     def __repr__(self) -> str:
-        place = f"{self._north:.2f} N, {self._east:.2f} E"
-        return f"{type(self).__name__}({place}, {self._speed:.2f} m/s)"
-
-    @property
-    def state(self) -> BodyState:
-        """The state after the last ``advance``."""
-        return BodyState(
-            time=self._time,
-            north=self._north,
-            east=self._east,
-            down=0.0,
-            yaw=self._yaw,
-            pitch=0.0,
-            roll=0.0,
-            forward_speed=self._speed,
-            lateral_speed=0.0,
-            yaw_rate=self._yaw_rate,
-        )
+        return f"{type(self).__name__}({self.state})"
 
     def advance(self, duration: float) -> None:
         """Move by ``duration`` seconds."""
@@ -61,17 +44,21 @@ class PlanarBody:
         raise NotImplementedError
 
     def _step(self, dt: float) -> None:
-        speed = approach(self._speed, self._demanded_speed, self.lag, MAX_ACCELERATION, dt)
+        s, demanded = self.state, self._demanded_speed
+        speed = approach(s.forward_speed, demanded, self.lag, MAX_ACCELERATION, dt)
         yaw_rate = self._next_yaw_rate(speed, dt)
         # Mean speed of both ends, along the heading in the middle: second order on arcs.
-        distance = 0.5 * (self._speed + speed) * dt
-        turned = 0.5 * (self._yaw_rate + yaw_rate) * dt
-        heading = self._yaw + 0.5 * turned
-        self._north += distance * math.cos(heading)
-        self._east += distance * math.sin(heading)
-        self._yaw = wrap_angle(self._yaw + turned)
-        self._speed, self._yaw_rate = speed, yaw_rate
-        self._time += dt
+        distance = 0.5 * (s.forward_speed + speed) * dt
+        turned = 0.5 * (s.yaw_rate + yaw_rate) * dt
+        heading = s.yaw + 0.5 * turned
+        self.state = s._replace(
+            time=s.time + dt,
+            north=s.north + distance * math.cos(heading),
+            east=s.east + distance * math.sin(heading),
+            yaw=wrap_angle(s.yaw + turned),
+            forward_speed=speed,
+            yaw_rate=yaw_rate,
+        )
 
 
 def approach(value: float, target: float, lag: float, limit: float, dt: float) -> float:

@@ -38,6 +38,7 @@ class PostgresServer:
         self.folder = Path(tempfile.mkdtemp(prefix="mav-tasks-pg-"))
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = int(free.getsockname()[1])
+        self._where = ("-h", "127.0.0.1", "-p", str(self.port))
         self._bin = self._reachable(install) / "bin"
         self._process: subprocess.Popen[bytes] | None = None
         self.owner = NOBODY if os.geteuid() == 0 else os.geteuid()
@@ -59,8 +60,7 @@ class PostgresServer:
     def start(self) -> None:
         """Start the server, and wait until it takes connections."""
         options = [f"--{name}={value}" for name, value in SETTINGS.items()]
-        options += ["-D", str(self.folder / "data"), "-k", str(self.folder)]
-        options += ["-h", "127.0.0.1", "-p", str(self.port)]
+        options += ["-D", str(self.folder / "data"), "-k", str(self.folder), *self._where]
         with (self.folder / "log").open("ab") as log:
             self._process = subprocess.Popen(
                 [self._bin / "postgres", *options], stdout=log, stderr=log, **_ordinary()
@@ -87,7 +87,7 @@ class PostgresServer:
 
     def create_database(self, name: str) -> str:
         """Create an empty database; return its URL."""
-        self.run("createdb", "-h", "127.0.0.1", "-p", str(self.port), "-U", "postgres", name)
+        self.run("createdb", *self._where, "-U", "postgres", name)
         return self.url(name)
 
     def close(self) -> None:
@@ -98,25 +98,18 @@ class PostgresServer:
 
     def run(self, program: str, *arguments: str, **environment: str) -> None:
         """Run one of PostgreSQL's programs; raise OSError if it fails."""
-        done = self._ran(program, *arguments, **environment)
+        command = [str(self._bin / program), *arguments]
+        own: dict[str, Any] = {"env": {**os.environ, **environment}, **_ordinary()}
+        done = subprocess.run(command, capture_output=True, text=True, check=False, **own)
         if done.returncode != 0:
             raise OSError(f"{program}: {done.stderr}")
 
-    def _ran(
-        self, program: str, *arguments: str, **environment: str
-    ) -> "subprocess.CompletedProcess[str]":
-        return subprocess.run(
-            [self._bin / program, *arguments],
-            capture_output=True,
-            text=True,
-            check=False,
-            env={**os.environ, **environment},
-            **_ordinary(),
-        )
-
     def _answers(self) -> bool:
-        where = ("-h", "127.0.0.1", "-p", str(self.port), "-U", "postgres", "-d", "postgres")
-        return self._ran("pg_isready", *where).returncode == 0
+        try:
+            self.run("pg_isready", *self._where, "-U", "postgres", "-d", "postgres")
+        except OSError:
+            return False
+        return True
 
     def _reachable(self, install: Path) -> Path:
         """Return the programs' folder; a copy if they are root's alone and we are root.

@@ -7,10 +7,9 @@ below a quarter of the throttle.
 
 import math
 
-from rover_sim.body import BodyState
-from rover_sim.estimate import Estimate
-from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
-from rover_sim.parameters import Parameters
+from rover_sim.frames import Frame
+from rover_sim.motion import CONTROL_PERIOD, YawControl, clipped, toward
+from rover_sim.onboard import Onboard
 from rover_sim.steering import Demand, Output
 
 MANY = 1000.0  # m/s² or rad/s²: for a limit parameter of 0 or less, which means none
@@ -25,50 +24,46 @@ FREE_ROLLING = 2.0  # s, disarmed. SIH's rolls on for ever, which is an artefact
 
 
 class DifferentialDrive:
-    """Feed-forward to wheels that follow exactly; implements ``DriveTrain``.
+    """Feed-forward to wheels that follow exactly.
 
     Disarmed, it stops at once, as geared motors without current do; in HOLD it brakes at the limit.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
-        self._yaw = YawControl(yaw_limits(parameters))
+    def __init__(self, on: Onboard) -> None:
+        self._on = on
+        values = on.parameters  # deg/s, deg/s²
+        rate = math.radians(values["RO_YAW_RATE_LIM"])
+        up, down = (math.radians(_limit(values[f"RO_YAW_{way}_LIM"])) for way in ("ACCEL", "DECEL"))
+        self._yaw = YawControl(rate, up, down, YAW_INTEGRAL)
         self._speed = 0.0
 
-    def __repr__(self) -> str:
-        return f"DifferentialDrive({self._speed:.2f} m/s)"
-
-    def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
+    def step(self, demand: Demand) -> tuple[float, float]:
         """Return forward speed and yaw rate for the wheels, for one control period."""
-        del truth
+        measured = self._on.estimate.yaw_rate
         if demand.output is Output.OFF:
             self._speed = 0.0
-            return 0.0, self._yaw.step(0.0, estimate.yaw_rate, rolls=False)
-        self._speed = ramped(self._speed, demand.speed, self._parameters)
-        yaw_rate = self._yaw.step(demand.yaw_rate, estimate.yaw_rate, rolls=self._speed != 0.0)
+            return 0.0, self._yaw.step(0.0, measured, rolls=False)
+        self._speed = ramped(self._speed, demand.speed, self._on)
+        yaw_rate = self._yaw.step(demand.yaw_rate, measured, rolls=self._speed != 0.0)
         return self._speed, yaw_rate
 
 
 class AckermannDrive:
-    """Throttle against friction and drag; implements ``DriveTrain``.
+    """Throttle against friction and drag.
 
     With the default gains (RO_SPEED_P and I nearly 0) it drives too fast, and does not move at 0.5
     m/s or below.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
+    def __init__(self, on: Onboard) -> None:
+        self._on = on
         self._asked = 0.0  # m/s, ramped
         self._integral = 0.0  # throttle
         self._speed = 0.0  # m/s, of the wheels
         self._underway = [0.0] * DEAD_TIME  # throttles within the dead time
 
-    def __repr__(self) -> str:
-        return f"AckermannDrive({self._asked:.2f} m/s asked, {self._speed:.2f} m/s)"
-
-    def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
+    def step(self, demand: Demand) -> tuple[float, float]:
         """Return forward speed and yaw rate for the wheels, for one control period."""
-        del truth
         if demand.output is Output.OFF:
             self._asked = self._integral = 0.0
             self._underway = [0.0] * DEAD_TIME
@@ -76,23 +71,23 @@ class AckermannDrive:
             if abs(self._speed) < ROLLED_OUT:
                 self._speed = 0.0
             return self._speed, 0.0
-        self._underway.append(self._throttle(demand, estimate))
+        self._underway.append(self._throttle(demand))
         self._speed = pushed(self._speed, self._underway.pop(0))
         yaw = demand.yaw_rate
         return self._speed, yaw if abs(self._speed) > ROLLED_OUT else 0.0
 
-    def _throttle(self, demand: Demand, estimate: Estimate) -> float:
-        values = self._parameters
-        self._asked = ramped(self._asked, demand.speed, values)
+    def _throttle(self, demand: Demand) -> float:
+        values, speed = self._on.parameters, self._on.estimate.forward_speed
+        self._asked = ramped(self._asked, demand.speed, self._on)
         forward = self._asked / values["RO_MAX_THR_SPEED"]
         if abs(self._asked) < FLT_EPSILON:
             self._integral = 0.0
             return forward
-        is_seen = abs(estimate.forward_speed) > values["RO_SPEED_TH"]
-        error = self._asked - (estimate.forward_speed if is_seen else 0.0)
+        is_seen = abs(speed) > values["RO_SPEED_TH"]
+        error = self._asked - (speed if is_seen else 0.0)
         self._integral += values["RO_SPEED_I"] * error * CONTROL_PERIOD
-        self._integral = max(-1.0, min(1.0, self._integral))
-        return max(-1.0, min(1.0, forward + values["RO_SPEED_P"] * error + self._integral))
+        self._integral = clipped(self._integral, 1.0)
+        return clipped(forward + values["RO_SPEED_P"] * error + self._integral, 1.0)
 
 
 def pushed(speed: float, throttle: float) -> float:
@@ -107,32 +102,17 @@ def pushed(speed: float, throttle: float) -> float:
     return after if after * speed > 0.0 else 0.0
 
 
-NO_LIMIT = 5.0  # m/s, about the motors' limit, for RO_SPEED_LIM = -1
-
-
-def speed_limit_of(parameters: Parameters) -> float:
-    """Return the speed limit of a PX4 rover, m/s."""
-    limit = parameters["RO_SPEED_LIM"]
-    return limit if limit > 0.0 else NO_LIMIT
-
-
-def ramped(speed: float, asked: float, parameters: Parameters) -> float:
+def ramped(speed: float, asked: float, on: Onboard) -> float:
     """Return the demanded speed one control period later, ramped within RO_*_LIM."""
-    limit = speed_limit_of(parameters)
-    asked = max(-limit, min(limit, asked))
+    asked = clipped(asked, on.speed_limit)
     name = "RO_DECEL_LIM" if abs(asked) < abs(speed) else "RO_ACCEL_LIM"
-    return toward(speed, asked, _limit(parameters[name]) * CONTROL_PERIOD)
-
-
-def yaw_limits(parameters: Parameters) -> YawLimits:
-    """Return RO_YAW_RATE_LIM (deg/s), RO_YAW_ACCEL_LIM and RO_YAW_DECEL_LIM (deg/s²)."""
-    return YawLimits(
-        rate=math.radians(parameters["RO_YAW_RATE_LIM"]),
-        acceleration=math.radians(_limit(parameters["RO_YAW_ACCEL_LIM"])),
-        deceleration=math.radians(_limit(parameters["RO_YAW_DECEL_LIM"])),
-        integral=YAW_INTEGRAL,
-    )
+    return toward(speed, asked, _limit(on.parameters[name]) * CONTROL_PERIOD)
 
 
 def _limit(value: float) -> float:
     return value if value > 0.0 else MANY
+
+
+def px4_drive(on: Onboard) -> DifferentialDrive | AckermannDrive:
+    """Return the drive train of a frame."""
+    return (AckermannDrive if on.persona.frame is Frame.ACKERMANN else DifferentialDrive)(on)

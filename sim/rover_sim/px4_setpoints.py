@@ -20,8 +20,6 @@ FORCE = 512
 YAW_RATE_IGNORED = 2048
 GLOBAL_INT_FRAMES = (5, 6, 11)  # only the INT forms
 
-LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
-
 Vector = tuple[float | None, float | None, float | None]
 
 
@@ -32,42 +30,42 @@ class Setpoint(NamedTuple):
     speed: float | None = None  # m/s towards a place, if the setpoint has one
 
 
-def read_px4_local(message: Local, estimate: Estimate, *, yaw_rate: bool) -> Setpoint | str:
-    """Parse SET_POSITION_TARGET_LOCAL_NED; return a text if it does not count as a setpoint.
+NOTHING: Vector = (None, None, None)
+
+
+def read_px4(
+    message: Local | Global, estimate: Estimate, origin: Origin, *, yaw_rate: bool
+) -> Setpoint | str:
+    """Parse a setpoint; return a text if it does not count as one.
 
     ``yaw_rate``: whether the rover honours a yaw rate in BODY_NED. Yaw is ignored.
     """
-    position = _given(message.type_mask, X, (message.x, message.y, message.z))
-    velocity = _given(message.type_mask, VX, (message.vx, message.vy, message.vz))
-    acceleration = _given(message.type_mask, AX, (message.afx, message.afy, message.afz))
-    if message.coordinate_frame == MavFrame.LOCAL_NED:
-        return _setpoint(message, position, velocity, acceleration)
-    if message.coordinate_frame != MavFrame.BODY_NED:
-        return f"{LOCAL} coordinate frame {message.coordinate_frame} unsupported"
-    forward, right, down = velocity
-    if forward is None or right is None or down is None:
-        return _setpoint(message, NOTHING, NOTHING, acceleration)
-    rate = message.yaw_rate
-    if yaw_rate and not message.type_mask & YAW_RATE_IGNORED and math.isfinite(rate):
-        return Setpoint(TurnRate(rate, forward))
-    cos, sin = math.cos(estimate.yaw), math.sin(estimate.yaw)
-    turned = (forward * cos - right * sin, forward * sin + right * cos, down)
-    return _setpoint(message, NOTHING, turned, acceleration)
-
-
-def read_px4_global(message: Global, origin: Origin) -> Setpoint | str:
-    """Parse SET_POSITION_TARGET_GLOBAL_INT; return a text if it does not count as a setpoint."""
-    position: Vector = NOTHING
-    if not message.type_mask & (X | X << 1 | X << 2):
-        if message.coordinate_frame not in GLOBAL_INT_FRAMES:
-            return f"Setpoint frame {message.coordinate_frame} unsupported"
-        position = (*origin.to_local(message.lat_int, message.lon_int), 0.0)
-    velocity = _given(message.type_mask, VX, (message.vx, message.vy, message.vz))
-    acceleration = _given(message.type_mask, AX, (message.afx, message.afy, message.afz))
-    return _setpoint(message, position, velocity, acceleration)
-
-
-NOTHING: Vector = (None, None, None)
+    mask, frame, position = message.type_mask, message.coordinate_frame, NOTHING
+    velocity = _given(mask, VX, (message.vx, message.vy, message.vz))
+    acceleration = _given(mask, AX, (message.afx, message.afy, message.afz))
+    if isinstance(message, Global):
+        if not mask & (X | X << 1 | X << 2):
+            if frame not in GLOBAL_INT_FRAMES:
+                return f"Setpoint frame {frame} unsupported"
+            position = (*origin.to_local(message.lat_int, message.lon_int), 0.0)
+    elif frame == MavFrame.LOCAL_NED:
+        position = _given(mask, X, (message.x, message.y, message.z))
+    elif frame == MavFrame.BODY_NED:
+        forward, right, down = velocity
+        velocity = NOTHING
+        if forward is not None and right is not None and down is not None:
+            rate = message.yaw_rate
+            if yaw_rate and not mask & YAW_RATE_IGNORED and math.isfinite(rate):
+                return Setpoint(TurnRate(rate, forward))
+            cos, sin = math.cos(estimate.yaw), math.sin(estimate.yaw)
+            velocity = (forward * cos - right * sin, forward * sin + right * cos, down)
+    else:
+        return f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {frame} unsupported"
+    if acceleration != NOTHING and mask & FORCE:
+        return "Setpoint with force unsupported"
+    if position == velocity == acceleration == NOTHING:
+        return "Setpoint invalid: nothing given"
+    return _setpoint(position, velocity)
 
 
 def _given(mask: int, first_bit: int, values: tuple[float, float, float]) -> Vector:
@@ -78,16 +76,7 @@ def _given(mask: int, first_bit: int, values: tuple[float, float, float]) -> Vec
     return x, y, z
 
 
-def _setpoint(
-    message: Local | Global,
-    position: Vector,
-    velocity: Vector,
-    acceleration: Vector,
-) -> Setpoint | str:
-    if acceleration != NOTHING and message.type_mask & FORCE:
-        return "Setpoint with force unsupported"
-    if position == velocity == acceleration == NOTHING:
-        return "Setpoint invalid: nothing given"
+def _setpoint(position: Vector, velocity: Vector) -> Setpoint:
     north, east, _ = position
     vn, ve, _ = velocity
     speed = math.hypot(vn, ve) if vn is not None and ve is not None else None

@@ -15,23 +15,15 @@ TRUTH_INTERVAL = 0.1  # s
 
 
 class Clock:
-    """Simulated time: the monotonic clock, scaled from its start."""
+    """Simulated time: the monotonic clock, scaled by ``speed`` from its start."""
 
     def __init__(self, speed: float) -> None:
-        self._speed = speed
-        self._start = time.monotonic()
+        self.speed = speed
+        self.start = time.monotonic()
 
     def now(self) -> float:
         """Return simulated seconds; at real speed they equal the monotonic clock."""
-        return self._start + (time.monotonic() - self._start) * self._speed
-
-    def elapsed(self, now: float) -> float:
-        """Return simulated seconds since the start."""
-        return now - self._start
-
-    def real(self, duration: float) -> float:
-        """Return the real seconds that a simulated duration takes."""
-        return duration / self._speed
+        return self.start + (time.monotonic() - self.start) * self.speed
 
 
 def drive(
@@ -50,20 +42,20 @@ def drive(
     with selector:
         while True:
             deadline = min(vehicle.next_deadline() for vehicle in vehicles)
-            ready = selector.select(max(0.0, clock.real(deadline - clock.now())))
+            ready = selector.select(max(0.0, (deadline - clock.now()) / clock.speed))
             if any(key.fileobj is stop for key, _ in ready):
                 return
             if ready:
                 _read(server, vehicles, clock)
             now = clock.now()
-            for line in faults.play(clock.elapsed(now), now=now):
+            for line in faults.play(now - clock.start, now=now):
                 sys.stdout.write(f"rover_sim: {line}\n")
                 sys.stdout.flush()
             for vehicle in vehicles:
                 vehicle.handle_deadline(now=now)
                 _send(server, vehicle)
             if truth is not None and now >= truth_due:
-                _write_truth(truth, vehicles, clock.elapsed(now))
+                _write_truth(truth, vehicles, now - clock.start)
                 truth_due = max(truth_due + TRUTH_INTERVAL, now)
 
 

@@ -12,7 +12,7 @@ from mav_tasks.mavlink.enums import MavFrame
 from rover_sim.body import wrap_angle
 from rover_sim.errors import SimulatedCrash
 from rover_sim.estimate import Estimate
-from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
+from rover_sim.geo import Origin, is_on_earth
 
 # POSITION_TARGET_TYPEMASK
 POSITION_IGNORED = 0x0003  # x or y
@@ -52,33 +52,33 @@ Local = messages.SetPositionTargetLocalNed
 Global = messages.SetPositionTargetGlobalInt
 
 
-def read_local(message: Local, estimate: Estimate, *, speed_limit: float) -> Target | None:
-    """Parse SET_POSITION_TARGET_LOCAL_NED; return None if Rover drops it silently."""
+def read_setpoint(
+    message: Local | Global, estimate: Estimate, origin: Origin, *, speed_limit: float
+) -> Target | None:
+    """Return the target of a setpoint; None if Rover drops it silently."""
+    has_place = not message.type_mask & POSITION_IGNORED
     frame = message.coordinate_frame
+    if isinstance(message, Global):
+        if frame not in GLOBAL_FRAMES:
+            return None
+        if has_place:
+            return read_place(message.lat_int, message.lon_int, origin)
+        return _read_motion(message, 0.0, speed_limit)
     if frame not in LOCAL_FRAMES:
         return None
-    if not message.type_mask & POSITION_IGNORED:
-        _abort_on_nan(message.x, message.y)
-        if frame in BODY_FRAMES:
-            cos, sin = math.cos(estimate.yaw), math.sin(estimate.yaw)
-            return Destination(
-                estimate.north + message.x * cos - message.y * sin,
-                estimate.east + message.x * sin + message.y * cos,
-            )
-        if frame == MavFrame.LOCAL_OFFSET_NED:
-            return Destination(estimate.north + message.x, estimate.east + message.y)
-        return Destination(message.x, message.y)
     base_yaw = estimate.yaw if frame in BODY_FRAMES else 0.0
-    return _read_motion(message, base_yaw, speed_limit)
-
-
-def read_global(message: Global, origin: Origin, *, speed_limit: float) -> Target | None:
-    """Parse SET_POSITION_TARGET_GLOBAL_INT; return None if Rover drops it silently."""
-    if message.coordinate_frame not in GLOBAL_FRAMES:
-        return None
-    if not message.type_mask & POSITION_IGNORED:
-        return read_place(message.lat_int, message.lon_int, origin)
-    return _read_motion(message, 0.0, speed_limit)
+    if not has_place:
+        return _read_motion(message, base_yaw, speed_limit)
+    _abort_on_nan(message.x, message.y)
+    if frame == MavFrame.LOCAL_NED:
+        return Destination(message.x, message.y)
+    if frame == MavFrame.LOCAL_OFFSET_NED:
+        return Destination(estimate.north + message.x, estimate.east + message.y)
+    cos, sin = math.cos(base_yaw), math.sin(base_yaw)
+    return Destination(
+        estimate.north + message.x * cos - message.y * sin,
+        estimate.east + message.x * sin + message.y * cos,
+    )
 
 
 def read_place(latitude_degE7: int, longitude_degE7: int, origin: Origin) -> Destination | None:
@@ -88,7 +88,7 @@ def read_place(latitude_degE7: int, longitude_degE7: int, origin: Origin) -> Des
     """
     if latitude_degE7 == 0 and longitude_degE7 == 0:
         return None
-    if abs(latitude_degE7) > LATITUDE_LIMIT_DEGE7 or abs(longitude_degE7) > LONGITUDE_LIMIT_DEGE7:
+    if not is_on_earth(latitude_degE7, longitude_degE7):
         return None
     return Destination(*origin.to_local(latitude_degE7, longitude_degE7))
 

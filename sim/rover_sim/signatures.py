@@ -29,10 +29,6 @@ class RoverSignatures:
         self._unix_offset = unix_offset
         self._signer = Signer(key, link_id=LINK_ID)
         self._times = StreamTimes()
-        self.refused = 0
-
-    def __repr__(self) -> str:
-        return f"RoverSignatures({self._key.name}, {self.refused} refused)"
 
     def sealed(self, raw: bytes, *, now: float) -> bytes:
         """Return a packet signed."""
@@ -40,13 +36,10 @@ class RoverSignatures:
 
     def believes(self, packet: Packet, *, now: float) -> bool:
         """Return whether to accept a packet."""
-        is_good = packet.message_id in FROM_RADIOS
-        if packet.is_signed:
-            is_good = is_signed_with(packet, self._key.secret) and self._is_news(packet, now)
-        self.refused += not is_good
-        return is_good
-
-    def _is_news(self, packet: Packet, now: float) -> bool:
+        if not packet.is_signed:
+            return packet.message_id in FROM_RADIOS
+        if not is_signed_with(packet, self._key.secret):
+            return False
         stream, timestamp = stream_of(packet), timestamp_of(packet)
         window = Window.since(self._clock(now) - WINDOW)
         if not self._times.is_news(stream, timestamp, window):

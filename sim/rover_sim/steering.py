@@ -8,10 +8,11 @@ observed (no speed, no turn).
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
 
 from rover_sim.body import wrap_angle
 from rover_sim.estimate import Estimate
+from rover_sim.motion import clipped
+from rover_sim.setpoints import Destination
 
 MAX_YAW_RATE = 1.6  # rad/s
 HEADING_GAIN = 1.2  # 1/s, yaw rate per heading error
@@ -44,61 +45,34 @@ HOLD = Demand(0.0, 0.0, Output.NEUTRAL)
 COAST = Demand(0.0, 0.0, Output.OFF)
 
 
-class SteerToPoint(Protocol):
-    """A way to drive to a point."""
-
-    def __call__(
-        self, estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
-    ) -> Demand | None:
-        """Return the demand; None within ``radius`` (m)."""
-        ...
+def way_to(estimate: Estimate, place: Destination) -> tuple[float, float]:
+    """Return the distance to a place (m), and how far it is off the heading (rad)."""
+    dn, de = place.north - estimate.north, place.east - estimate.east
+    return math.hypot(dn, de), wrap_angle(math.atan2(de, dn) - estimate.yaw)
 
 
 def steer_to_heading(estimate: Estimate, yaw: float, speed: float) -> Demand:
     """Return the demand to drive at ``speed`` while turning to ``yaw`` on an arc."""
     limit = min(MAX_YAW_RATE, abs(estimate.forward_speed) / TURN_RADIUS)
-    wanted = HEADING_GAIN * wrap_angle(yaw - estimate.yaw)
-    return Demand(speed, max(-limit, min(limit, wanted)))
+    return Demand(speed, clipped(HEADING_GAIN * wrap_angle(yaw - estimate.yaw), limit))
 
 
-def steer_to_point(
-    estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
+def steer_to_place(
+    estimate: Estimate, place: Destination, speed_limit: float, radius: float, *, pivots: bool
 ) -> Demand | None:
-    """Return the demand to drive to a point and slow down there; None within ``radius``."""
-    dn, de = north - estimate.north, east - estimate.east
-    distance = math.hypot(dn, de)
+    """Return the demand to drive to a place and slow down there; None within ``radius`` (m).
+
+    A rover that ``pivots`` turns on the spot towards the place. Another one never stops on the way,
+    because it could not turn then, and drives at half speed if the place is behind it.
+    """
+    distance, error = way_to(estimate, place)
     if distance < radius:
         return None
-    error = wrap_angle(math.atan2(de, dn) - estimate.yaw)
-    yaw_rate = _turn(error)
+    yaw_rate = clipped(2.0 * HEADING_GAIN * error, MAX_YAW_RATE)
+    approach = min(math.sqrt(2.0 * 0.6 * BRAKING * distance), APPROACH_GAIN * distance)
+    if not pivots:
+        speed = min(speed_limit, max(approach, LEAST_ARC_SPEED))
+        return Demand(speed * (1.0 - 0.5 * abs(error) / math.pi), yaw_rate)
     if abs(error) > PIVOT_ERROR:
         return Demand(0.0, yaw_rate)
-    return Demand(min(speed_limit, _approach(distance)) * math.cos(error), yaw_rate)
-
-
-def arc_to_point(
-    estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
-) -> Demand | None:
-    """Return the demand to drive to a point on arcs, for a rover that cannot turn on the spot.
-
-    None within ``radius``. The rover never stops on the way, because it could not turn then. It
-    drives at half speed if the point is behind it.
-    """
-    dn, de = north - estimate.north, east - estimate.east
-    distance = math.hypot(dn, de)
-    if distance < radius:
-        return None
-    error = wrap_angle(math.atan2(de, dn) - estimate.yaw)
-    yaw_rate = _turn(error)
-    speed = min(speed_limit, max(_approach(distance), LEAST_ARC_SPEED))
-    return Demand(speed * (1.0 - 0.5 * abs(error) / math.pi), yaw_rate)
-
-
-def _turn(error: float) -> float:
-    """Return the yaw rate, rad/s, that turns by a heading error."""
-    return max(-MAX_YAW_RATE, min(MAX_YAW_RATE, 2.0 * HEADING_GAIN * error))
-
-
-def _approach(distance: float) -> float:
-    """Return the highest speed, m/s, from which the rover stops within a distance."""
-    return min(math.sqrt(2.0 * 0.6 * BRAKING * distance), APPROACH_GAIN * distance)
+    return Demand(min(speed_limit, approach) * math.cos(error), yaw_rate)

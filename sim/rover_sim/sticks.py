@@ -7,6 +7,7 @@ the setpoint, whichever is larger (its mode.cpp, calc_speed_nudge). Channels are
 from dataclasses import replace
 
 from mav_tasks.mavlink import messages
+from rover_sim.onboard import Onboard
 from rover_sim.steering import MAX_YAW_RATE, Demand
 
 STEERING, THROTTLE = 0, 2  # channels 1 and 3
@@ -22,16 +23,15 @@ DEFAULT_TOP_SPEED = 4.0  # m/s at full throttle: SITL's rover-skid, 3 m/s at 75 
 class Sticks:
     """The present RC channels."""
 
-    def __init__(self, top_speed: float | None) -> None:
+    def __init__(self, on: Onboard) -> None:
+        self._on = on
+        top_speed = on.realism.stick_speed
         self._top_speed = DEFAULT_TOP_SPEED if top_speed is None else top_speed
         self._adds_speed = top_speed is not None
         self._held = ALL_NEUTRAL
         self._override: dict[int, int] = {}  # by channel
         self._overridden_at = float("-inf")
         self.is_there = self._adds_speed  # ArduPilot has receiver values even without one
-
-    def __repr__(self) -> str:
-        return f"Sticks({self._held}, {self._override})"
 
     def hold(self, forward_speed: float, yaw_rate: float) -> None:
         """Hold the transmitter's sticks at this demand, m/s and rad/s."""
@@ -45,9 +45,11 @@ class Sticks:
         held[THROTTLE], held[STEERING] = throttle, steering
         self._held = tuple(held)
 
-    def take_override(self, message: messages.RcChannelsOverride, *, now: float) -> None:
-        """Override channels, or release them."""
-        self._overridden_at = now
+    def take_override(self, message: messages.RcChannelsOverride) -> None:
+        """Override channels, or release them; PX4 takes none."""
+        if not self._adds_speed:
+            return
+        self._overridden_at = self._on.now
         for channel in range(COUNT):
             value = getattr(message, f"chan{channel + 1}_raw")
             if value == RELEASED:
@@ -55,7 +57,7 @@ class Sticks:
             elif value != NO_CHANGE:
                 self._override[channel] = value
 
-    def channels(self, *, now: float) -> tuple[int, ...]:
+    def channels(self, now: float) -> tuple[int, ...]:
         """Return the pulses of the first eight channels, µs."""
         if not self._override:
             return self._held
@@ -63,29 +65,23 @@ class Sticks:
             self._override.clear()
         return tuple(self._override.get(n, held) for n, held in enumerate(self._held))
 
-    def demand(self, *, now: float) -> Demand | None:
-        """Return the sticks' demand in MANUAL; None if they are neutral."""
-        channels = self.channels(now=now)
-        if channels == ALL_NEUTRAL:
-            return None
+    def demand(self) -> Demand:
+        """Return the sticks' demand in MANUAL."""
+        channels = self.channels(self._on.now)
         speed = _part(channels[THROTTLE]) * self._top_speed
-        yaw_rate = _part(channels[STEERING]) * MAX_YAW_RATE
-        return None if speed == yaw_rate == 0.0 else Demand(speed, yaw_rate)
+        return Demand(speed, _part(channels[STEERING]) * MAX_YAW_RATE)
 
-    def arming_refusal(self, *, now: float) -> str | None:
+    def arming_refusal(self) -> str | None:
         """Return the text that refuses arming, in ArduPilot's words (4.6.3), or None."""
-        if not self._adds_speed or _part(self.channels(now=now)[THROTTLE]) == 0.0:
-            return None
-        return "Arm: Throttle (RC3) is not neutral"
+        is_refused = self._adds_speed and self.demand().speed != 0.0
+        return "Arm: Throttle (RC3) is not neutral" if is_refused else None
 
-    def nudged(self, demand: Demand, *, now: float) -> Demand:
+    def nudged(self, demand: Demand) -> Demand:
         """Return the demand of a velocity setpoint in GUIDED, raised by the throttle stick."""
         if not self._adds_speed:
             return demand
-        pilot = _part(self.channels(now=now)[THROTTLE]) * self._top_speed
-        if demand.speed < 0.0:
-            return replace(demand, speed=min(demand.speed, pilot))
-        return replace(demand, speed=max(demand.speed, pilot))
+        larger = min if demand.speed < 0.0 else max
+        return replace(demand, speed=larger(demand.speed, self.demand().speed))
 
 
 def _part(pulse: int) -> float:

@@ -3,17 +3,14 @@
 MAVLink guide, "Message Interval"; REQUEST_DATA_STREAM sets the same intervals by group.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-
-from mav_tasks.mavlink import messages as m
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 OFF = 0.0
 NEVER = float("inf")
 LONGEST_TOLD = 2**31 - 1  # µs, the limit of MESSAGE_INTERVAL
 JITTER = 1e-6  # s; clock readings are not exact multiples of an interval
 ALL_STREAMS = 0  # MAV_DATA_STREAM
-RC_GROUP = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,83 +22,10 @@ class StreamTable:
     groups: Mapping[int, tuple[int, ...]]  # what REQUEST_DATA_STREAM sets, by MAV_DATA_STREAM
 
 
-ARDUPILOT_STREAMS = StreamTable(
-    intervals=dict.fromkeys(
-        (
-            m.Heartbeat.id,
-            m.SysStatus.id,
-            # The real one sends these two on request only; with both streamed, MAVSDK and
-            # QGroundControl can connect to the simulator without the server.
-            m.ExtendedSysState.id,
-            m.HomePosition.id,
-            m.Attitude.id,
-            m.LocalPositionNed.id,
-            m.GlobalPositionInt.id,
-            m.GpsRawInt.id,
-            m.VfrHud.id,
-            m.BatteryStatus.id,
-            m.SystemTime.id,
-            m.MissionCurrent.id,
-            m.PositionTargetGlobalInt.id,
-        ),
-        1.0,  # a SITL streams at 1 Hz by default
-    ),
-    shortest_interval=0.02,  # the real one's main loop
-    groups={  # as in Rover
-        1: (),  # RAW_SENSORS
-        2: (  # EXTENDED_STATUS
-            m.SysStatus.id,
-            m.MissionCurrent.id,
-            m.GpsRawInt.id,
-            m.PositionTargetGlobalInt.id,
-        ),
-        3: (),  # RC_CHANNELS
-        6: (m.GlobalPositionInt.id, m.LocalPositionNed.id),  # POSITION
-        10: (m.Attitude.id,),  # EXTRA1
-        11: (m.VfrHud.id,),  # EXTRA2
-        12: (m.SystemTime.id, m.BatteryStatus.id),  # EXTRA3
-    },
-)
-
-#: close to PX4's streams to an onboard computer, in whole control periods
-PX4_STREAMS = StreamTable(
-    intervals={
-        m.Heartbeat.id: 1.0,
-        m.Attitude.id: 0.025,
-        m.LocalPositionNed.id: 0.05,
-        m.GlobalPositionInt.id: 0.1,
-        m.VfrHud.id: 0.1,
-        m.PositionTargetGlobalInt.id: 0.1,
-        m.GpsRawInt.id: 0.2,
-        m.SysStatus.id: 0.2,
-        m.ExtendedSysState.id: 0.2,
-        m.SystemTime.id: 1.0,
-        m.MissionCurrent.id: 1.0,
-        m.HomePosition.id: 2.0,
-        m.BatteryStatus.id: 2.0,
-        m.CurrentMode.id: 2.0,
-        m.GpsGlobalOrigin.id: OFF,
-        m.AutopilotVersion.id: OFF,
-        m.ProtocolVersion.id: OFF,
-    },
-    shortest_interval=0.001,
-    groups={},  # it ignores REQUEST_DATA_STREAM
-)
-
-
-def with_sticks(table: StreamTable, unasked: float) -> StreamTable:
-    """Return the table with RC_CHANNELS every ``unasked`` seconds."""
-    message_id = m.RcChannels.id
-    groups = dict(table.groups)
-    if RC_GROUP in groups:
-        groups[RC_GROUP] = (*groups[RC_GROUP], message_id)
-    return replace(table, intervals={**table.intervals, message_id: unasked}, groups=groups)
-
-
 class Streams:
     """The interval and next due time of each message. One set for the whole link."""
 
-    def __init__(self, table: StreamTable, *, now: float) -> None:
+    def __init__(self, table: StreamTable, now: float) -> None:
         self._table = table
         self._intervals = dict(table.intervals)
         self._due = {
@@ -110,9 +34,6 @@ class Streams:
         }
         self._next = now  # least of _due: most control steps check nothing else
 
-    def __repr__(self) -> str:
-        return f"Streams(next={self._next:.3f})"
-
     def interval_us(self, message_id: int) -> int:
         """Return the interval for MESSAGE_INTERVAL: -1 off, 0 not available."""
         interval = self._intervals.get(message_id)
@@ -120,30 +41,29 @@ class Streams:
             return 0
         return -1 if interval == OFF else round(min(interval * 1e6, LONGEST_TOLD))
 
-    def set_interval(self, message_id: int, interval_us: float, *, now: float) -> bool:
+    def set_interval(self, message_id: int, interval_us: float, now: float) -> bool:
         """Set the interval in µs; 0 is the default, -1 off. Return False if refused."""
         if message_id not in self._intervals:
             return False
+        interval = interval_us * 1e-6
         if interval_us == 0:
-            self._set(message_id, self._table.intervals[message_id], now)
+            interval = self._table.intervals[message_id]
         elif interval_us == -1:
-            self._set(message_id, OFF, now)
-        elif not interval_us * 1e-6 >= self._table.shortest_interval:  # NaN fails, too
+            interval = OFF
+        elif not interval >= self._table.shortest_interval:  # NaN fails, too
             return False
-        else:
-            self._set(message_id, interval_us * 1e-6, now)
+        self._set(message_id, interval, now)
         return True
 
-    def set_group(self, group: int, rate: float, *, now: float) -> None:
+    def set_group(self, group: int, rate: float, now: float) -> None:
         """Set a whole group's rate in Hz; 0 switches it off."""
-        members: Iterable[int] = self._table.groups.get(group, ())
-        if group == ALL_STREAMS:
-            members = (message_id for ids in self._table.groups.values() for message_id in ids)
         interval = max(1.0 / rate, self._table.shortest_interval) if rate > 0 else OFF
-        for message_id in members:
-            self._set(message_id, interval, now)
+        for number, members in self._table.groups.items():
+            if group in (number, ALL_STREAMS):
+                for message_id in members:
+                    self._set(message_id, interval, now)
 
-    def take_due(self, *, now: float) -> list[int]:
+    def take_due(self, now: float) -> list[int]:
         """Return the ids that are due, and set the next due time of each."""
         horizon = now + JITTER
         if horizon < self._next:

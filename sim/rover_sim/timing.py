@@ -21,17 +21,14 @@ class Departures:
         self._chance = Random(seed)
         self._held_until = self._last_answer = float("-inf")
 
-    def __repr__(self) -> str:
-        return f"Departures({self._timing})"
-
-    def answer_at(self, *, now: float) -> float:
+    def answer_at(self, now: float) -> float:
         """Return when the answer to a present command leaves: never before an earlier answer."""
         least, most = self._timing.first_answer, self._timing.last_answer
         delay = least + (most - least) * self._chance.random() ** PROMPTNESS
         self._last_answer = max(now + delay, self._last_answer)
         return self._last_answer
 
-    def position_at(self, *, now: float) -> float:
+    def position_at(self, now: float) -> float:
         """Return when a position that is due now leaves."""
         if not self._timing.in_pairs:
             return now

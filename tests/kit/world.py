@@ -21,7 +21,6 @@ from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task, TaskId
-from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState, Pose
 from rover_sim.faults import Faults
 from rover_sim.frames import Frame
@@ -69,19 +68,9 @@ def twin_of(
     number: int, *, start: Pose, now: float, persona: Persona = PROMPT, is_same: bool = False
 ) -> Vehicle:
     """Return another vehicle with the same system id but another unique id, unless ``is_same``."""
+    uid = number if is_same else 99
     body = kinematic_body(start)
-    autopilot = Autopilot(
-        system_id=number if is_same else 99,
-        persona=persona,
-        origin=DEFAULT_ORIGIN,
-        unix_offset=0.0,
-        truth=body.state,
-        now=now,
-        realism=persona.realism,
-        seed=0,
-    )
-    autopilot.address = Address(number, 1)
-    return Vehicle(body=body, autopilot=autopilot, now=now)
+    return make_vehicle(body, system_id=number, now=now, persona=persona, uid=uid)
 
 
 def preset(vehicle: Vehicle, persona: Persona) -> None:

@@ -336,7 +336,7 @@ def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
     assert fleet.holder() is fleet.other
     if moved:
         fleet.until(fleet.stands, within=5)
-        vars(fleet.rover.body)["_east"] += 2.0  # somebody carries it aside
+        fleet.rover.push(0.0, 2.0, 0.0)  # somebody carries it aside
         fleet.until(lambda: fleet.task(task).state is S.HELD, within=10)
         assert fleet.task(task).reason is R.OFF_TRACK
     else:

@@ -107,7 +107,7 @@ class TestTurning:
         world.until(lambda: world.truth.yaw > 0.7, within=9)
         world.client.pause()
         world.run(3.0)
-        vars(world.rover.body)["_north"] += 0.1
+        world.rover.push(0.1, 0.0, 0.0)
         world.client.proceed()
         world.until_state(1, S.COMPLETED)
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from rover_sim.__main__ import read_options
+from rover_sim.__main__ import app
 
 pytestmark = pytest.mark.interop
 
@@ -25,21 +25,13 @@ LIMIT = 15.0  # s for anything that a test waits for
 READY = ("--boot", "none", "--peers", "all")  # unless a test says otherwise
 
 
-def command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "rover_sim", *arguments]
-
-
-def environment(**extra: str) -> dict[str, str]:
-    path = os.pathsep.join((str(ROOT), str(ROOT / "sim")))
-    return {**os.environ, "PYTHONPATH": path, **extra}
-
-
 @contextmanager
-def simulator(*arguments: str, **extra: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
+def simulator(*arguments: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """Run it on a free port; give the process and the port."""
+    own = arguments if "--boot" in arguments else READY + arguments
     process = subprocess.Popen(
-        command("--port", "0", *(arguments if "--boot" in arguments else READY + arguments)),
-        env=environment(**extra),
+        [sys.executable, "-m", "rover_sim", "--port=0", *own],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "sim")))},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -184,21 +176,24 @@ def test_bad_options_are_refused_by_name(capsys: pytest.CaptureFixture[str]) -> 
         (("--friction-variation", "1.5", "--seed", "1"), "--friction-variation"),
     ]:
         with pytest.raises(SystemExit) as ended:
-            read_options(options)
+            app(options)
         assert ended.value.code == 2
         assert named in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_faults_are_planned_on_the_command_line() -> None:
-    options = read_options(["--fault", "at 1 s: reboot", "--fault", "at 2 s: lose-gps for 3 s"])
-    assert [(fault.at, fault.lasts) for fault in options.faults] == [(1.0, None), (2.0, 3.0)]
+def test_faults_happen_as_planned_on_the_command_line() -> None:
+    plan = ("--fault", "at 0.1 s: reboot", "--fault", "at 0.2 s: lose-gps for 0.2 s")
+    with simulator("--body", "kinematic", *plan) as (process, _):
+        assert process.stdout is not None
+        said = [process.stdout.readline().split(" s: ", 1)[1].strip() for _ in range(3)]
+    assert said == [plan[1], plan[3], f"over: {plan[3]}"]
 
 
 def test_a_fault_that_is_not_understood_ends_it_at_once(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments, says in [
         (
             ["--fault", "at 1 s: bang"],
-            "--fault: unknown fault 'bang' in 'at 1 s: bang'; expected one of block-wheel",
+            "'--fault': unknown fault 'bang' in 'at 1 s: bang'; expected one of block-wheel",
         ),
         (["--fault", "rover 2 at 1 s: reboot"], "there is no rover 2"),
         (
@@ -207,6 +202,6 @@ def test_a_fault_that_is_not_understood_ends_it_at_once(capsys: pytest.CaptureFi
         ),
     ]:
         with pytest.raises(SystemExit) as ended:
-            read_options(arguments)
+            app(arguments)
         assert ended.value.code == 2
         assert says in capsys.readouterr().err

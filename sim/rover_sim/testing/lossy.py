@@ -1,9 +1,9 @@
 """A net that tests can degrade per leg, and that records the texts to clients."""
 
 from collections import deque
-from contextlib import AbstractContextManager
+from contextlib import ExitStack
 from dataclasses import dataclass
-from types import TracebackType
+from math import inf
 from typing import Literal
 
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
@@ -16,10 +16,10 @@ TEXTS_KEPT = 200
 
 #: which legs to degrade: clients to server, server to rovers, or both
 Leg = Literal["client", "rover", "both"]
-LEGS: dict[str, frozenset[str]] = {
-    "client": frozenset({CLIENT_LINK}),
-    "rover": frozenset({VEHICLE_LINK}),
-    "both": frozenset({CLIENT_LINK, VEHICLE_LINK}),
+LEGS = {
+    "client": (CLIENT_LINK,),
+    "rover": (VEHICLE_LINK,),
+    "both": (CLIENT_LINK, VEHICLE_LINK),
 }
 
 
@@ -41,24 +41,12 @@ class LossyNet(MemoryNet):
 
     def __init__(self, *, seed: int) -> None:
         super().__init__(seed=seed)
-        self._of_end: dict[str, Conditions] = {}
+        self.ways: dict[str, Conditions] = {}
         self.texts: deque[Text] = deque(maxlen=TEXTS_KEPT)
-
-    @property
-    def ways(self) -> dict[str, Conditions]:
-        """The conditions at the server's ends, where they differ from the net's."""
-        return dict(self._of_end)
-
-    @ways.setter
-    def ways(self, of_end: dict[str, Conditions]) -> None:
-        self._of_end = dict(of_end)
 
     def conditions_between(self, source: str, target: str) -> Conditions:
         """Return the conditions between two ends, one of which is the server's."""
-        for end in (source, target):
-            if end in self._of_end:
-                return self._of_end[end]
-        return self.conditions
+        return self.ways.get(source) or self.ways.get(target) or self.conditions
 
     def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
         """Record the texts that the server sends to a client."""
@@ -90,7 +78,7 @@ class LossyLink:
         delay: float = 0.001,
         jitter: float = 0.0,
         leg: Leg = "client",
-    ) -> AbstractContextManager[None]:
+    ) -> ExitStack:
         """Lose and duplicate (probabilities 0–1) and delay (s) datagrams, both ways.
 
         ``jitter`` is the largest extra delay of a datagram, so that datagrams can overtake each
@@ -98,36 +86,16 @@ class LossyLink:
         """
         if leg not in LEGS:
             raise ValueError(f"leg must be one of {', '.join(LEGS)}, not {leg!r}")
-        for name, value in (("loss", loss), ("duplication", duplication)):
-            if not 0.0 <= value <= 1.0:
-                raise ValueError(f"{name} must be 0 to 1, not {value!r}")
-        for name, value in (("delay", delay), ("jitter", jitter)):
-            if not 0.0 <= value < float("inf"):
-                raise ValueError(f"{name} must be 0 s or more, not {value!r}")
+        if not (0.0 <= loss <= 1.0 and 0.0 <= duplication <= 1.0):
+            raise ValueError(f"loss and duplication must be 0 to 1, not {loss} and {duplication}")
+        if not (0.0 <= delay < inf and 0.0 <= jitter < inf):
+            raise ValueError(f"delay and jitter must be 0 s or more, not {delay} and {jitter}")
         how = Conditions(delay=delay, jitter=jitter, loss=loss, duplication=duplication)
-        before = self._net.ways
-        self._net.ways = before | dict.fromkeys(LEGS[leg], how)
-        return _Mending(self._net, before)
+        end = ExitStack()
+        end.callback(setattr, self._net, "ways", self._net.ways)
+        self._net.ways = self._net.ways | dict.fromkeys(LEGS[leg], how)
+        return end
 
     def mend(self) -> None:
         """Make every leg good again."""
         self._net.ways = {}
-
-
-class _Mending:
-    """Restores the previous conditions at the end of a ``with`` block."""
-
-    def __init__(self, net: LossyNet, before: dict[str, Conditions]) -> None:
-        self._net = net
-        self._before = before
-
-    def __enter__(self) -> None:
-        """Do nothing: the call has already degraded the legs."""
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._net.ways = self._before

@@ -8,11 +8,12 @@ from zlib import crc32
 from rover_sim.frames import Frame
 from rover_sim.personas import PERSONAS, Persona
 
-BODIES = ("kinematic", "bullet")
 MOST_ROVERS = 250  # system ids
-
-
-FRAMES = ("", *(frame.value for frame in Frame))
+KNOWN = {
+    "persona": tuple(PERSONAS),
+    "body": ("kinematic", "bullet"),
+    "frame": ("", *(frame.value for frame in Frame)),
+}
 
 
 class MarkerError(Exception):
@@ -39,9 +40,9 @@ class RoverOptions:
 
     def __post_init__(self) -> None:
         """Raise MarkerError for an invalid value."""
-        _one_of("persona", self.persona, tuple(PERSONAS))
-        _one_of("body", self.body, BODIES)
-        _one_of("frame", self.frame, FRAMES)
+        for name, known in KNOWN.items():
+            if (value := getattr(self, name)) not in known:
+                raise MarkerError(f"{name} must be one of {', '.join(known)}, not {value!r}")
         if type(self.count) is not int or not 1 <= self.count <= MOST_ROVERS:
             raise MarkerError(f"count must be 1 to {MOST_ROVERS}, not {self.count!r}")
         if self.seed is not None and type(self.seed) is not int:
@@ -67,8 +68,3 @@ def seed_of(node_id: str) -> int:
     """Return a seed that stays the same while the test and its file keep their names."""
     path, _, name = node_id.partition("::")
     return crc32(f"{path.rpartition('/')[2]}::{name}".encode())
-
-
-def _one_of(name: str, value: object, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise MarkerError(f"{name} must be one of {', '.join(known)}, not {value!r}")

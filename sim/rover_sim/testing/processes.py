@@ -9,7 +9,6 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Self
 
 from rover_sim.testing.options import RoverOptions
 
@@ -25,7 +24,7 @@ class ProcessFailed(Exception):
 
 
 class OwnProcess:
-    """A module run as a process for a ``with`` block; it is ended by its own id."""
+    """A module run as a process; it is ended by its own id."""
 
     def __init__(self, module: str, arguments: Sequence[str], folder: Path) -> None:
         self.name = module
@@ -39,13 +38,8 @@ class OwnProcess:
                 env={name: v for name, v in os.environ.items() if not name.startswith(SETTINGS)},
             )
 
-    def __repr__(self) -> str:
-        return f"OwnProcess({self.name}, {self._popen.pid})"
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def end(self) -> None:
+        """End it."""
         self._popen.terminate()
         try:
             self._popen.wait(STOP_LIMIT)
@@ -84,29 +78,25 @@ class RealTime:
     def start_rovers(self) -> str:
         """Start the rovers; return their URL."""
         options = self._options
-        what = ["--body", options.body, "--persona", options.persona]
-        what += ["--frame", options.make.frame.value]
-        how = ["--count", str(options.count), "--seed", str(self._seed)]
-        rovers = self._start("rover_sim", "--port", "0", *what, *how)
+        chosen = {
+            "port": 0,
+            "body": options.body,
+            "persona": options.persona,
+            "frame": options.make.frame.value,
+            "count": options.count,
+            "seed": self._seed,
+        }
+        rovers = self._start("rover_sim", *(f"--{name}={value}" for name, value in chosen.items()))
         port = rovers.wait_for(r"on udp 127\.0\.0\.1:(\d+)")[1]
         return f"udpout:127.0.0.1:{port}"
 
     def start_server(self, rover_url: str) -> str:
         """Start the server; return its URL once it has found every rover."""
         port = _free_udp_port()
-        links = ["--client", f"udpin:127.0.0.1:{port}", "--no-push", "--vehicle", rover_url]
-        server = self._start(
-            "mav_tasks.cli",
-            "serve",
-            "--config",
-            "",
-            *links,
-            "--store",
-            ":memory:",
-            # a PX4 rover would first have to be configured to stop when setpoints stop
-            "--set",
-            "rules.loss_failsafe=accept",
-        )
+        own = ("--config=", "--store=:memory:", f"--client=udpin:127.0.0.1:{port}", "--no-push")
+        # a PX4 rover would first have to be configured to stop when setpoints stop
+        more = (f"--vehicle={rover_url}", "--set=rules.loss_failsafe=accept")
+        server = self._start("mav_tasks.cli", "serve", *own, *more)
         for number in range(1, self._options.count + 1):
             server.wait_for(rf"rover {number}: found")
         return f"udpout:127.0.0.1:{port}"
@@ -123,7 +113,8 @@ class RealTime:
         self._stack.close()
 
     def _start(self, module: str, *arguments: str) -> OwnProcess:
-        process = self._stack.enter_context(OwnProcess(module, arguments, self._folder))
+        process = OwnProcess(module, arguments, self._folder)
+        self._stack.callback(process.end)
         self._processes.append(process)
         return process
 

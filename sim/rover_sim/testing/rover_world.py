@@ -20,7 +20,6 @@ from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.errors import NotInVirtualTime, Stalled
 from rover_sim.kinematic_bodies import kinematic_body
-from rover_sim.manual_control import BodyByHand
 from rover_sim.testing.lossy import LossyLink, LossyNet, Text
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.simulated_rover import SimulatedRover
@@ -48,15 +47,16 @@ class RoverWorld:
         self._net = LossyNet(seed=seed)
         self._world = VirtualWorld(self._net)
         self._numbers = count(1)
-        self._bodies: list[BodyByHand] = []
+        self._bodies: list[Body] = []
         self.rovers = tuple(self._add_rover(number) for number in range(1, options.count + 1))
-        names = tuple(_name_of(rover.system_id) for rover in self.rovers)
+        names = tuple(f"rover{rover.system_id}" for rover in self.rovers)
         self.server = TaskServer(
             self._world, vehicles=names, settings=settings, wall_offset=self._began
         )
         self.lossy_link = LossyLink(self._net)
         self._loop = VirtualLoop(self._world)
         self._runner = asyncio.Runner(loop_factory=lambda: self._loop)
+        self._runner.get_loop()
 
     def __repr__(self) -> str:
         return f"RoverWorld(at {self.now:.3f} s, seed {self.seed}, {len(self.rovers)} rovers)"
@@ -88,26 +88,17 @@ class RoverWorld:
                 "an event loop is running here already: inside of a coroutine await"
                 " rover_world.client(), and give the coroutine to rover_world.run()"
             )
-        task: asyncio.Task[T] | None = None
-
-        async def kept() -> T:
-            nonlocal task
-            task = asyncio.current_task()
-            return await coroutine
-
         self._allow(self.options.limit)
+        task = self._loop.create_task(coroutine)
         try:
-            return self._runner.run(kept())
+            return self._loop.run_until_complete(task)
         except Stalled as stalled:
             raise stalled.with_traceback(None) from None  # its message says who waits
         finally:
-            if task is not None and not task.done():
+            if not task.done():
                 self._cut_off(task)
 
-    def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run a coroutine like ``run``; SyncClient calls this."""
-        __tracebackhide__ = True
-        return self.run(coroutine)
+    call = run  # SyncClient's name for it
 
     def sleep(self, seconds: float) -> None:
         """Let virtual time pass. Raise Stalled beyond the marker's ``limit``."""
@@ -138,7 +129,6 @@ class RoverWorld:
         """Cancel running tasks and release all resources."""
         self._allow(CLEAN_UP)
         try:
-            self._runner.run(_nothing())  # the runner creates its loop on its first run
             self._runner.close()
         finally:
             for body in self._bodies:
@@ -151,25 +141,20 @@ class RoverWorld:
         """Cancel the task of a stalled run, so that it does not continue in the next."""
         self._allow(CLEAN_UP * 2)
         task.cancel()
-        self._runner.run(_ended(task))
+        self._loop.run_until_complete(asyncio.wait({task}, timeout=CLEAN_UP))
 
     def _add_rover(self, number: int) -> SimulatedRover:
         persona = self.options.make
-        body = BodyByHand(self._make_body(number), frame=persona.frame)
+        body = self._make_body(number)
         self._bodies.append(body)
-        vehicle = make_vehicle(
-            body,
-            system_id=number,
-            now=0.0,
-            persona=persona,
-            seed=self.seed + number,
-        )
+        seed = self.seed + number
+        vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona, seed=seed)
         if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
             # Hold: by default a PX4 rover drives home when setpoints stop, and the server drives no
             # task
             vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = 5
-        self._world.join(RoverParty(vehicle, self._net.link(_name_of(number))))
-        return SimulatedRover(vehicle, body, persona=persona, clock=lambda: self.now)
+        self._world.join(RoverParty(vehicle, self._net.link(f"rover{number}")))
+        return SimulatedRover(vehicle, persona=persona, clock=lambda: self.now)
 
     def _make_body(self, number: int) -> Body:
         start = Pose(east=SPACING * (number - 1))
@@ -179,21 +164,9 @@ class RoverWorld:
         return BulletBody(start=start, frame=frame, variation=VARIATION, seed=seed)
 
 
-def _name_of(number: int) -> str:
-    return f"rover{number}"
-
-
 def _is_in_a_loop() -> bool:
     try:
         asyncio.get_running_loop()
     except RuntimeError:
         return False
     return True
-
-
-async def _nothing() -> None:
-    """Return at once."""
-
-
-async def _ended(task: asyncio.Task[Any]) -> None:
-    await asyncio.wait({task}, timeout=CLEAN_UP)

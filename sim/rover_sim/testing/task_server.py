@@ -91,21 +91,23 @@ class TaskServer:
 
     def kill(self) -> None:
         """End the server abruptly; nothing stops the rovers."""
-        if self._server is None or not self.is_running:
-            raise RuntimeError("the task server is not running")
+        self._world.leave(self._running)
         self._is_killed = True
-        self._world.leave(self._server)
 
     def stop(self) -> None:
         """Request an orderly shutdown: the server stops the rovers and ends within a second."""
-        if self._server is None or not self.is_running:
-            raise RuntimeError("the task server is not running")
-        self._server.shut_down(now=self._world.now)
+        self._running.shut_down(now=self._world.now)
 
     def restart(self) -> None:
         """Kill and start the server, as after a crash: active tasks are held, the queues paused."""
         self.kill()
         self.start()
+
+    @property
+    def _running(self) -> InMemoryServer:
+        if self._server is None or not self.is_running:
+            raise RuntimeError("the task server is not running")
+        return self._server
 
     def _end_life(self) -> Restored | None:
         """Archive the events of the last run; return what it stored, or None without a run."""

@@ -29,19 +29,9 @@ def describe_tasks(loop: asyncio.AbstractEventLoop) -> str:
 
 def _frames(awaitable: Any) -> Iterator[FrameType]:
     """Yield the frames of a coroutine, of the one that it awaits, and so on."""
-    while awaitable is not None:
-        for frame_name, next_name in (
-            ("cr_frame", "cr_await"),
-            ("gi_frame", "gi_yieldfrom"),
-            ("ag_frame", "ag_await"),
-        ):
-            frame = getattr(awaitable, frame_name, None)
-            if frame is not None:
-                yield frame
-                awaitable = getattr(awaitable, next_name)
-                break
-        else:
-            return
+    while (frame := getattr(awaitable, "cr_frame", None)) is not None:
+        yield frame
+        awaitable = awaitable.cr_await
 
 
 def _describe(frame: FrameType) -> str:
