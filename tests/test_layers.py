@@ -36,7 +36,7 @@ rover_sim.trial: basics client kinds links tasks rover_sim.observing
 rover_sim.demo: client basics shell kinds links recording rover_sim rover_sim.testing config tasks \
 rover_sim.observing
 cli: basics mavlink links config plans kinds tasks store recording shell client web agents probe \
-rover_sim rover_sim.trial
+rover_sim rover_sim.trial rover_sim.demo
 """
 
 

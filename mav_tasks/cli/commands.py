@@ -1,7 +1,6 @@
 """All commands, in the order of the help: name, function, and the first line of its help."""
 
 from mav_tasks.cli.lazy import LazyCommand as Lazy
-from mav_tasks.cli.program import Program
 from mav_tasks.client.operations import OPERATION, OPERATIONS, Operation
 
 HALTS = ("stop", "pause", "resume")
@@ -21,7 +20,7 @@ def _shows(name: str) -> Lazy:
 COMMANDS = (
     Lazy("serve", "serve:serve", "Run the task server.", kind="serve:ServeCommand"),
     Lazy("sim", "sim:sim", "Run simulated rovers on UDP 14580."),
-    Program("demo", "rover_sim.demo", "Run the demonstration: three tasks, driven and measured."),
+    Lazy("demo", "demo:demo", "Run the demonstration: three tasks, driven and measured."),
     Lazy("submit", "submit:app", "Submit a task."),
     *(_shows(name) for name in ("status", "queue", "history")),
     *map(_made, OPERATIONS),

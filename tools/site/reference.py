@@ -1,6 +1,5 @@
 """What the reference shows: the templates in templates/ are filled in from the code with it."""
 
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +10,6 @@ from typer.main import get_command
 import mav_tasks
 from mav_tasks.cli.app import app
 from mav_tasks.cli.lazy import LazyCommand
-from mav_tasks.cli.program import Program
 from mav_tasks.client.aio import Client
 from mav_tasks.config.key_ring.watch import RingWatch
 from mav_tasks.config.setting_keys.literals import in_digits, literal
@@ -51,9 +49,6 @@ def _commands(command: Any, name: str, parent: Any) -> Iterator[dict[str, Any]]:
         command = command.load()
     context = command.context_class(command, info_name=name, parent=parent)
     usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
-    if isinstance(command, Program):  # its own help names its options
-        arguments = [sys.executable, "-m", "mav_tasks.cli", name, "--help"]
-        usage = subprocess.run(arguments, check=True, capture_output=True, text=True).stdout
     records = (each.get_help_record(context) for each in command.get_params(context))
     yield {
         "name": context.command_path,

@@ -5,19 +5,22 @@ priority 5 wait, and the one with the higher priority runs first. Exit status 0:
 order, states and the measured movement are correct; 1: some are wrong; 2: it cannot be run.
 """
 
-import argparse
 from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from typer import Option
 
 from mav_tasks.basics.errors import RecordError
 from rover_sim.bullet import NO_PYBULLET, has_pybullet
-from rover_sim.demo import fast, real
+from rover_sim.demo import fast as virtual
+from rover_sim.demo import real
 from rover_sim.demo.processes import DemoError
 from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import problems
 from rover_sim.errors import MissingExtra
 from rover_sim.observing.picture import draw
 
-OUTPUT = "demo-output"
 PICTURE = "track.png"
 USAGE = 2
 
@@ -31,46 +34,69 @@ NO_PAGE = "demo: --web needs real time, and cannot be used with --fast"
 NO_FLEET = "demo: --fleet cannot be used with --fast, --web, --gui or --record"
 
 
-def main() -> int:
-    """Run the demonstration; return the exit status."""
-    options = _parser().parse_args()
+def demo(
+    fast: Annotated[bool, Option("--fast", help="One process, virtual time, no sockets.")] = False,
+    gui: Annotated[
+        bool, Option("--gui", help="Show pybullet's window instead of writing a picture.")
+    ] = False,
+    web: Annotated[bool, Option("--web", help="Serve the web page, too, until Ctrl-C.")] = False,
+    fleet: Annotated[
+        bool,
+        Option("--fleet", help="Two gateways over PostgreSQL, four rovers: one gateway is killed."),
+    ] = False,
+    body: Annotated[
+        Literal["bullet", "kinematic"] | None, Option(help="Default: bullet if it is installed.")
+    ] = None,
+    record: Annotated[
+        str, Option(metavar="FOLDER", help="Write a record for mav-tasks replay to this folder.")
+    ] = "",
+    output: Annotated[Path, Option(metavar="FOLDER", help="Folder for the picture.")] = Path(
+        "demo-output"
+    ),
+    seed: Annotated[
+        int, Option(help="Seed of the friction, which varies by 30 %; 0: no variation.")
+    ] = 0,
+) -> None:
+    """Drive three tasks that a client submits, and measure the result."""
     screen = Screen()
-    body = options.body or ("bullet" if has_pybullet() else "kinematic")
-    if options.body is None and body == "kinematic":
+    kind = body or ("bullet" if has_pybullet() else "kinematic")
+    if body is None and kind == "kinematic":
         screen.say(f"demo: {NO_PYBULLET}")
-    others = options.web or options.gui or options.record
     for is_wrong, words in (
-        (options.gui and (options.fast or body != "bullet"), NO_WINDOW),
-        (options.web and options.fast, NO_PAGE),
-        (options.fleet and (options.fast or others), NO_FLEET),
+        (gui and (fast or kind != "bullet"), NO_WINDOW),
+        (web and fast, NO_PAGE),
+        (fleet and (fast or web or gui or record), NO_FLEET),
     ):
         if is_wrong:
             screen.say(words)
-            return USAGE
+            raise typer.Exit(USAGE)
+    how = {"body": kind, "seed": seed, "record": record}
     try:
-        wrong = _run(options, screen, body)
+        if fleet:
+            from rover_sim.demo import fleet as gateways  # noqa: PLC0415  # needs more packages
+
+            wrong = gateways.drive(screen, body=kind)
+        else:
+            wrong = _run(screen, output, how, fast=fast, gui=gui, web=web)
     except (DemoError, MissingExtra, RecordError) as error:
         screen.say(f"demo: {error}")
-        return USAGE
+        raise typer.Exit(USAGE) from error
     screen.say(f"demo: {wrong} wrong" if wrong else "demo: all correct")
-    return int(wrong > 0)
+    raise typer.Exit(int(wrong > 0))
 
 
-def _run(options: argparse.Namespace, screen: Screen, body: str) -> int:
-    """Show it; return how much went wrong."""
-    if options.fleet:
-        from rover_sim.demo import fleet  # noqa: PLC0415  # needs more packages
-
-        return fleet.drive(screen, body=body)
-    how = {"body": body, "seed": options.seed, "record": options.record}
+def _run(
+    screen: Screen, output: Path, how: dict[str, Any], *, fast: bool, gui: bool, web: bool
+) -> int:
+    """Show the three tasks; return how much went wrong."""
     with screen.live():
-        if options.fast:
-            party, track = fast.drive(screen, **how)
+        if fast:
+            party, track = virtual.drive(screen, **how)
         else:
-            party, track = real.drive(screen, **how, gui=options.gui, web=options.web)
+            party, track = real.drive(screen, **how, gui=gui, web=web)
     screen.conclude(party)
-    if track and not options.gui:
-        picture = Path(options.output).resolve() / PICTURE
+    if track and not gui:
+        picture = output.resolve() / PICTURE
         try:
             draw({"Track of the rover": track.places}, picture)
         except ImportError:
@@ -81,36 +107,3 @@ def _run(options: argparse.Namespace, screen: Screen, body: str) -> int:
     for problem in wrong:
         screen.say(f"WRONG: {problem}")
     return len(wrong)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="mav-tasks demo", description=__doc__.partition("\n")[0])
-    add = parser.add_argument
-    add("--fast", action="store_true", help="one process, virtual time, no sockets")
-    add("--gui", action="store_true", help="show pybullet's window instead of writing a picture")
-    add("--web", action="store_true", help="serve the web page, too, until Ctrl-C")
-    add(
-        "--fleet",
-        action="store_true",
-        help="two gateways over PostgreSQL and four rovers: one gateway is killed",
-    )
-    add("--body", choices=("bullet", "kinematic"), help="default: bullet if it is installed")
-    add(
-        "--record",
-        metavar="FOLDER",
-        default="",
-        help="write a record for mav-tasks replay to this folder",
-    )
-    add(
-        "--output",
-        metavar="FOLDER",
-        default=OUTPUT,
-        help="folder for the picture; default: %(default)s",
-    )
-    add(
-        "--seed",
-        type=int,
-        default=0,
-        help="seed of the friction, which varies by 30 %%; 0: no variation",
-    )
-    return parser
