@@ -33,6 +33,9 @@ COMMANDS = (
         "Look for what is wrong, from the settings to the rovers.",
     ),
     Lazy("probe", "probe:probe", "Test what a rover can do, without a server."),
+    Lazy(
+        "trial", "trial:trial", "Drive a rover through a table of requirements, and write a report."
+    ),
     Lazy("mission", "plans:mission", "Upload, start and download missions."),
     Lazy("fence", "plans:fence", "Upload, download and clear the fence."),
     Lazy("rally", "plans:rally", "Upload and clear rally points."),

@@ -39,6 +39,7 @@ class LinkDriver:
     def __init__(self, link: Link, talk: Talk, *, signatures: ClientSignatures | None) -> None:
         """``signatures``: for all packets; None: they are not signed. Call ``begin`` next."""
         self.link = link
+        self._stream = link if isinstance(link, StreamLink) else None
         self._talk = talk
         self._signatures = signatures
         self._loop = asyncio.get_running_loop()
@@ -67,8 +68,8 @@ class LinkDriver:
         except BaseException:  # the loop cannot watch it: a virtual-time loop, for instance
             self.link.close()
             raise
-        if isinstance(self.link, StreamLink):
-            self._tend(self.link)
+        if self._stream is not None:
+            self._tend(self._stream)
         self._on_timer()
 
     def turn(self) -> None:
@@ -136,9 +137,9 @@ class LinkDriver:
         return self._signatures is None or self._signatures.believes(packet, utc=time.time())
 
     def _take_changes(self) -> None:
-        if not isinstance(self.link, StreamLink):
+        if self._stream is None:
             return
-        for change in self.link.take_changes():
+        for change in self._stream.take_changes():
             if change.state is PeerState.UP:
                 self._peers.setdefault(change.peer)
                 self.is_down = ""

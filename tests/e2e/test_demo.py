@@ -72,7 +72,7 @@ def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
         start_new_session=True,
     )
     mapped = Path(f"/proc/{running.pid}/maps")  # Python has begun, and imports
-    wait_until(lambda: "/numpy/" in mapped.read_text(), within=30)
+    wait_until(lambda: "_asyncio" in mapped.read_text(), within=30)
     with pytest.raises(subprocess.TimeoutExpired):
         running.wait(after)
     os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to all of the group

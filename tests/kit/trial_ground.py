@@ -3,31 +3,29 @@
 import asyncio
 from collections.abc import Coroutine
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Any, TypeVar
 
 from mav_tasks.client.aio import Client
 from mav_tasks.config.settings import Settings
-from mav_tasks.links.base import Link
 from mav_tasks.links.memory import MemoryNet
 from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
 from rover_sim.body import Pose
-from rover_sim.field_trial.track import Place, Track
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.observing.virtual import ROVER, VirtualGround
 from rover_sim.personas import PERSONAS
 from rover_sim.realism import Gps
 from rover_sim.testing.task_server import TaskServer
-from rover_sim.testing.virtual_loop import VirtualLoop
+from rover_sim.trial.session import Ground
 from rover_sim.vehicle import make_vehicle
-from rover_sim.virtual import RoverParty, VirtualWorld
+from rover_sim.virtual import VirtualWorld
 
 T = TypeVar("T")
 
 SEED = 1
-ROVER = "rover1"
 SLIP = 0.3  # of the kinematic body, as in the pytest plugin
 NEUTRAL = 1500  # µs
-MOST_VIRTUAL, MOST_REAL = 7200.0, 300.0  # s, of one trial
 SIGTERM_WITHIN = 5.0  # s
 LOOK = 0.05  # s
 
@@ -52,78 +50,63 @@ MAKES = {
 }
 
 
-class TrialGround:
-    """Implements ``Ground``; ``run`` runs a trial in its time."""
+class VirtualServer:
+    """Implements the trial's ``Server``."""
+
+    def __init__(self, world: VirtualWorld) -> None:
+        self._server = TaskServer(world, vehicles=(ROVER,), settings=Settings(), wall_offset=0.0)
+
+    async def start(self) -> None:
+        self._server.start()
+
+    async def end(self) -> None:
+        if self._server.is_running:
+            self._server.stop()
+        async with asyncio.timeout(SIGTERM_WITHIN):
+            while self._server.is_running:  # noqa: ASYNC110  # it has no event of its own
+                await asyncio.sleep(LOOK)
+
+    async def kill(self) -> None:
+        self._server.kill()
+
+    def why_ended(self) -> str:
+        return ""
+
+
+class TrialGround(Ground):
+    """A rover whose restart and stick are at hand; ``run`` runs a trial in its time."""
+
+    can_reboot = True
 
     def __init__(self, make: Make, *, seed: int = SEED) -> None:
         persona = PERSONAS[make.persona].on(make.frame)
         realism = replace(persona.realism, estimator=persona.estimators[make.gps])
-        net = MemoryNet(seed=seed)
-        self._net = net
-        self._world = VirtualWorld(net)
+        numbers = count()
         body = kinematic_body(make.frame, start=Pose(), slip=SLIP, seed=seed)
-        self.vehicle = make_vehicle(
+        vehicle = self.vehicle = make_vehicle(
             body, system_id=1, now=0.0, persona=persona, realism=realism, seed=seed
         )
         for name, value in make.parameters:
-            self.vehicle.autopilot.parameters[name] = value
-        self._world.join(RoverParty(self.vehicle, net.link(ROVER)))
-        self._server = TaskServer(
-            self._world, vehicles=(ROVER,), settings=Settings(), wall_offset=0.0
+            vehicle.autopilot.parameters[name] = value
+
+        self._virtual = VirtualGround(vehicle, MemoryNet(seed=seed))
+        net = self._virtual.net
+        super().__init__(
+            VirtualServer(self._virtual.world),
+            lambda: Client(net.link(f"client{next(numbers)}", peers=(CLIENT_LINK,))),
+            lambda: net.link(VEHICLE_LINK, peers=(ROVER,)),
+            self._virtual.truth,
         )
-        self.truth: Track | None = Track()
-        self._world.watch(self._note)
-        self._loop = VirtualLoop(self._world)
-        self._clients = 0
 
     def run(self, trial: Coroutine[Any, Any, T]) -> T:
         """Run a trial to its end, in virtual time."""
-        self._loop.allow(MOST_VIRTUAL, real_seconds=MOST_REAL)
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            return runner.run(trial)
-
-    async def start_server(self) -> None:
-        """Start the server on the store of the previous one."""
-        self._server.start()
-
-    async def end_server(self) -> None:
-        """End the server in order."""
-        if self._server.is_running:
-            self._server.stop()
-        for _ in range(round(SIGTERM_WITHIN / LOOK)):
-            if not self._server.is_running:
-                return
-            await asyncio.sleep(LOOK)
-        raise TimeoutError(f"the server still runs {SIGTERM_WITHIN} s after it was asked to end")
-
-    async def kill_server(self) -> None:
-        """Kill the server."""
-        self._server.kill()
-
-    def client(self) -> Client:
-        """Return another client."""
-        self._clients += 1
-        return Client(self._net.link(f"client{self._clients}", peers=(CLIENT_LINK,)))
-
-    def rover_link(self) -> Link:
-        """Return a link at the server's address, to which the rover speaks."""
-        return self._net.link(VEHICLE_LINK, peers=(ROVER,))
-
-    can_reboot = True
+        return self._virtual.run(trial)
 
     async def reboot(self) -> None:
-        """Restart the autopilot."""
-        self.vehicle.autopilot.reboot(now=self._world.now)
+        self.vehicle.autopilot.reboot(now=self._virtual.world.now)
 
     can_push_stick = True
 
     def push_stick(self, throttle: int | None) -> None:
-        """Hold the transmitter's throttle stick; None is neutral."""
         pulse = NEUTRAL if throttle is None else throttle
         self.vehicle.autopilot.operator_pulses(pulse, NEUTRAL)
-
-    def _note(self, now: float) -> None:
-        state = self.vehicle.truth
-        assert self.truth is not None
-        if not len(self.truth) or now >= self.truth.last.time + LOOK / 2:
-            self.truth.add(Place(now, state.north, state.east, state.yaw))

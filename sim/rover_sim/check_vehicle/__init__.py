@@ -1,6 +1,7 @@
-"""Conformance checks: what the task server and its clients expect of a vehicle.
+"""Does a rover behave as the real autopilots do? For developers, and not in the wheel.
 
-``python -m rover_sim.check_vehicle URL`` checks any vehicle that speaks MAVLink, simulated or real.
-It uses only pymavlink and shares no code with the server or the simulated rover, so that a
-misunderstanding of the protocol cannot cancel itself out.
+``contract`` lists what the server and its clients rely on beyond what ``mav-tasks probe`` tells,
+and asks any rover for it. ``manoeuvres`` drives a simulated rover through what two real autopilots
+were recorded in, ``figures`` measures it, ``real`` has their figures (real.csv) and the reasons for
+differences (explained.csv). ``simulated`` makes the rovers, in virtual time.
 """

@@ -1,139 +1,126 @@
-"""``python -m rover_sim.check_vehicle URL``: check whether a vehicle behaves as expected.
+"""``python -m rover_sim.check_vehicle [URL]``: without a URL, of the simulated rovers."""
 
-This file has the command line, the link and the signals; ``contract`` lists the checks.
-"""
-
-import argparse
-import json
-import signal
+import asyncio
 import sys
-from collections.abc import Sequence
+from collections import Counter
+from typing import Annotated
 
-from rover_sim.check_vehicle.context import Options
-from rover_sim.check_vehicle.contract import GROUPS, NothingHeard, check_vehicle
-from rover_sim.check_vehicle.conventions import WAYS
-from rover_sim.check_vehicle.report import Line
-from rover_sim.check_vehicle.wire import BadUrl, MavutilWire, Url, read_url
+import typer
 
-PASSED, FAILED, USAGE_ERROR, INTERRUPTED = 0, 1, 2, 130
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+from mav_tasks.basics.errors import UsageError
+from mav_tasks.links.base import Link
+from mav_tasks.links.link_limits import TO_VEHICLES
+from mav_tasks.links.url import parse_url
+from rover_sim.check_vehicle.contract import GROUPS, Check, Options, Seen, check_all
+from rover_sim.check_vehicle.real import Verdict, compare
+from rover_sim.check_vehicle.simulated import ROVERS, Make, in_its_world, measure
+from rover_sim.observing.driver import Interference
+from rover_sim.observing.observer import Observer
+from rover_sim.observing.track import Track
+
+OURS = (254, 190)  # not 255: an operator's failsafe may watch the heartbeats of 255
+EVERYTHING = Options(arm=True, write=True)
+BOOTED = 45.0  # s, until an ArduPilot uses its GPS
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the checks; return the exit status: 0 passed, 1 failed, 2 usage or no vehicle."""
-    parser = make_parser()
-    values = parser.parse_args(arguments)
+def main(
+    url: Annotated[str, typer.Argument(help="URL of a rover; default: the simulated rovers.")] = "",
+    only: Annotated[
+        str, typer.Option(metavar="WORD", help="Only checks and figures of groups with this word.")
+    ] = "",
+    arm: Annotated[bool, typer.Option("--arm", help="Arm and disarm it, without moving.")] = False,
+    write: Annotated[
+        bool, typer.Option("--write", help="Upload plans, then restore the old ones.")
+    ] = False,
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Allow --arm beyond this machine.")
+    ] = False,
+    rover: Annotated[
+        str,
+        typer.Option(metavar="WORD", help=f"Simulated rovers with this word: {', '.join(ROVERS)}."),
+    ] = "",
+    brief: Annotated[bool, typer.Option("--brief", help="Only what is wrong.")] = False,
+) -> None:
+    """Check whether a rover behaves as the server and its clients expect.
+
+    Without a URL: the simulated rovers, also beside recordings of the real ones, in virtual time.
+    The exit status is 1 if a check fails or a figure differs.
+    """
+    groups = [group for group in GROUPS if only.lower() in group]
+    makes = {name: make for name, make in ROVERS.items() if rover in name}
     try:
-        url = read_url(values.url)
-    except BadUrl as error:
-        parser.error(str(error))
-    if not 0.0 < values.speed <= 100.0:
-        parser.error("--speed must be above 0, at most 100")
-    if values.system_id is not None and not 1 <= values.system_id <= 255:
-        parser.error("--system-id must lie within 1..255")
-    if unknown := set(values.only) - set(GROUPS):
-        parser.error(f"--only {' '.join(unknown)}: expected {', '.join(GROUPS)}")
-    if (values.arm or values.drive) and not url.is_local and not values.insecure:
-        parser.error(f"{values.url} is beyond this machine: add --insecure to arm that vehicle")
-    for number in ENDING:
-        signal.signal(number, _interrupt_once)
-    return _run(url, values)
+        if not makes:
+            raise UsageError(f"--rover {rover}: there are {', '.join(ROVERS)}")
+        if url and not groups:
+            raise UsageError(f"--only {only}: groups are {', '.join(GROUPS)}")
+        if url:
+            link, options = _opened(url, insecure=insecure or not arm), Options(arm, write)
+            bad = asyncio.run(_checked(link, options, groups, brief))
+        else:
+            bad = sum(_simulated(*each, only, groups, brief) for each in makes.items())
+    except (UsageError, Interference) as error:
+        sys.stderr.write(f"check_vehicle: {error}\n")
+        raise typer.Exit(2) from None
+    raise typer.Exit(bool(bad))
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(
-        prog="rover_sim.check_vehicle",
-        description="Check whether a MAVLink rover behaves as a task server and its clients expect."
-        " Nothing moves and nothing stays changed unless you give --arm, --drive or --write.",
-    )
-    add = parser.add_argument
-    add("url", help="udpout:127.0.0.1:14580, udpin:…, tcp:…, tcpin:… or serial:/dev/ttyACM0:57600")
-    add(
-        "--persona",
-        choices=("auto", *WAYS),
-        default="auto",
-        help="autopilot to expect (default: the one that it reports)",
-    )
-    add("--arm", action="store_true", help="arm and disarm the vehicle without moving it")
-    add(
-        "--drive", action="store_true", help="arm the vehicle and drive some metres: keep 20 m free"
-    )
-    add(
-        "--write", action="store_true", help="upload missions and fences, then restore the old ones"
-    )
-    add(
-        "--insecure",
-        action="store_true",
-        help="allow --arm and --drive for a vehicle that is not on this machine",
-    )
-    add("--system-id", type=int, help="system id of the vehicle, if there are several")
-    add(
-        "--only",
-        nargs="+",
-        default=list(GROUPS),
-        metavar="GROUP",
-        help=f"groups of checks: {', '.join(GROUPS)}",
-    )
-    add(
-        "--speed",
-        type=float,
-        default=1.0,
-        help="simulated seconds per real second of a simulated vehicle",
-    )
-    add("--json", action="store_true", help="print a JSON list at the end instead of lines")
-    return parser
+def _opened(url: str, *, insecure: bool) -> Link:
+    parsed = parse_url(url)
+    is_serial = url.startswith("serial:")
+    if not insecure and (is_serial or not parsed.is_nearby):
+        raise UsageError(f"{url} is beyond this machine: add --insecure to arm that rover")
+    return parsed.open(limits=TO_VEHICLES)
 
 
-def _run(url: Url, values: argparse.Namespace) -> int:
-    options = Options(
-        arm=values.arm, drive=values.drive, write=values.write, persona=values.persona
-    )
-    show = _silent if values.json else _show
+async def _checked(link: Link, options: Options, groups: list[str], brief: bool) -> int:
+    """Print a line for each check, what failed again at the end; return how many failed."""
+    observer = Observer(link, source=OURS, keeps=True)
+    lines: list[tuple[str, str]] = []
     try:
-        wire = MavutilWire(url, speed=values.speed)
-    except Exception as error:  # noqa: BLE001 - pymavlink's links raise what they like
-        return _complain(f"{values.url}: {error}")
-    try:
-        report = check_vehicle(
-            wire, options, system_id=values.system_id, show=show, groups=tuple(values.only)
-        )
-    except NothingHeard as error:
-        return _complain(str(error))
-    except KeyboardInterrupt:
-        sys.stderr.write("check_vehicle: interrupted\n")
-        return INTERRUPTED
+        async for check, seen in check_all(observer, options, groups):
+            lines.append(line_of(check, seen))
+            if not brief:
+                _say(": ".join(lines[-1]))
     finally:
-        wire.close()
-    if values.json:
-        sys.stdout.write(json.dumps(report.as_json(), indent=1) + "\n")
-    else:
-        for line in report.failed:
-            sys.stdout.write(f"{line}\n")
-        sys.stdout.write(f"{report.summary()}\n")
-    return FAILED if report.failed else PASSED
+        observer.close()
+    for outcome, line in lines:
+        if outcome == "FAIL":
+            _say(f"{outcome}: {line}")
+    count = Counter(outcome for outcome, _ in lines)
+    _say(f"{count['ok']} ok, {count['FAIL']} failed, {count['skipped']} skipped")
+    return count["FAIL"]
 
 
-def _interrupt_once(_number: int, _frame: object) -> None:
-    """Raise KeyboardInterrupt, which brings the vehicle to rest; ignore further signals."""
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
-    raise KeyboardInterrupt
+def line_of(check: Check, seen: Seen) -> tuple[str, str]:
+    """Return the outcome of a check, and its line."""
+    outcome = "skipped" if seen.is_right is None else "ok" if seen.is_right else "FAIL"
+    expected = f"expected {check.expected}; seen: " if outcome == "FAIL" else ""
+    return outcome, f"{check.group}: {check.name}: {expected}{seen.words}"
 
 
-def _show(line: Line) -> None:
-    sys.stdout.write(f"{line}\n")
+def _simulated(name: str, make: Make, only: str, groups: list[str], brief: bool) -> int:
+    """Check one simulated rover, and print its figures beside the real ones; count what is bad."""
+
+    async def run(link: Link, _truth: Track) -> int:
+        await asyncio.sleep(BOOTED)
+        return await _checked(link, EVERYTHING, groups, brief)
+
+    _say(f"{name}: simulated, beside {make.real}")
+    bad = in_its_world(make, 0, run) if groups else 0
+    count: Counter[Verdict] = Counter()
+    for each in compare(name, measure(make, seed=0)):
+        if only.lower() in each.group.lower():
+            count[each.verdict] += 1
+            if each.verdict is Verdict.DIFFERS or not brief:
+                _say(str(each))
+    _say(f"{name}: " + ", ".join(f"{count[each]} {each.value}" for each in Verdict))
+    return bad + count[Verdict.DIFFERS]
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
 
-def _silent(_line: Line) -> None:
-    """Print nothing: the JSON list comes at the end."""
-
-
-def _complain(text: str) -> int:
-    sys.stderr.write(f"check_vehicle: {text}\n")
-    return USAGE_ERROR
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -1,204 +1,112 @@
-"""Missions, fences and rally points: download, and with ``write`` upload and restore."""
+"""The mission protocol of a rover: what is uploaded comes back, and can be cleared."""
 
 import math
 from collections.abc import Sequence
 from typing import Any
 
-from rover_sim.check_vehicle.context import Context
-from rover_sim.check_vehicle.identity import AUTOPILOT_VERSION
-from rover_sim.check_vehicle.probe import AUTOPILOT, OURS
-from rover_sim.check_vehicle.telemetry import GLOBAL_POSITION_INT
+from pymavlink.dialects.v20 import development as mav
 
-MISSION_REQUEST, MISSION_COUNT, MISSION_ACK, MISSION_REQUEST_INT, MISSION_ITEM_INT = (
-    40,
-    44,
-    47,
-    51,
-    73,
-)
-ACCEPTED = 0  # MAV_MISSION_RESULT
+from rover_sim.observing.observer import AUTOPILOT, Observer
+
 STEP_LIMIT = 1.5  # s, QGroundControl's
 TRIES = 3
-TYPES = {0: "mission", 1: "fence", 2: "rally points"}
-CAPABILITY = {1: 16384, 2: 32768}  # MAV_PROTOCOL_CAPABILITY: fence, rally
-WAYPOINT, FENCE_CIRCLE, RALLY_POINT = 16, 5003, 5100
-GLOBAL_RELATIVE_ALT = 3
-FENCE_RADIUS = 1000.0  # m: too large to affect a rover
+RADIUS = 1000.0  # m, of a fence too large to affect a rover
+#: small plans: command, param1, how many, by MAV_MISSION_TYPE
+PLANS = {
+    mav.MAV_MISSION_TYPE_MISSION: (mav.MAV_CMD_NAV_WAYPOINT, 0.0, 3),
+    mav.MAV_MISSION_TYPE_FENCE: (mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, RADIUS, 1),
+    mav.MAV_MISSION_TYPE_RALLY: (mav.MAV_CMD_NAV_RALLY_POINT, 0.0, 1),
+}
+
+#: of MISSION_ITEM_INT, between seq and mission_type
+FIELDS: tuple[str, ...] = ("frame", "command", "current", "autocontinue")
+FIELDS += ("param1", "param2", "param3", "param4", "x", "y", "z")
+Item = tuple[Any, ...]
 
 
-def check_plans(context: Context) -> None:
-    """Download each plan; with ``write`` upload another, compare, clear, and restore."""
-    for mission_type, name in TYPES.items():
-        capability = CAPABILITY.get(mission_type, 0)
-        version = context.probe.last(AUTOPILOT_VERSION)
-        if version is not None and version.capabilities & capability != capability:
-            context.report.skip(name, "not among its capabilities")
-            continue
-        items = _check_download(context, mission_type, name)
-        if items is None:
-            continue
-        if not context.options.write:
-            context.report.skip(f"{name}: upload", "changes what is stored; --write checks it")
-            continue
-        try:
-            _check_upload(context, mission_type, name)
-        finally:
-            result = _upload(context, mission_type, items)
-            if result != "accepted":
-                why = f"the old items are not restored: {result}"
-                context.report.fail(f"{name}: restore", expected="accepted", seen=why)
+class Wrong(Exception):
+    """The rover does not do as the protocol says; the message says where."""
 
 
-def _check_download(context: Context, mission_type: int, name: str) -> list[Any] | None:
-    items = _download(context, mission_type)
-    context.report.expect(
-        f"{name}: download",
-        not isinstance(items, str),
-        expected="MISSION_COUNT, addressed to the sender, and each requested item",
-        seen=items if isinstance(items, str) else f"{len(items)} items",
-    )
-    return None if isinstance(items, str) else items
+async def check(
+    observer: Observer, kind: int, around: tuple[int, int], first: int, may_write: bool
+) -> str:
+    """Download a plan; with leave, upload another one, compare, clear and restore. Raise Wrong.
+
+    ``first``: items before it are the rover's own.
+    """
+    before = await download(observer, kind)
+    if not may_write:
+        return f"{len(before)} items; nothing written"
+    try:
+        plan = _plan(kind, *around)
+        await upload(observer, kind, plan)
+        back = await download(observer, kind)
+        gists = [[(item[1], *item[8:10]) for item in items[first:]] for items in (plan, back)]
+        if gists[0] != gists[1]:
+            raise Wrong(f"uploaded {gists[0]}, back came {gists[1]}")
+        observer.send(observer.out.mission_clear_all_encode(observer.system, AUTOPILOT, kind))
+        ack = await observer.wait("MISSION_ACK", STEP_LIMIT)
+        left = await download(observer, kind)
+        if ack is None or ack.type or len(left) > first:
+            raise Wrong(f"cleared with {ack}, and {len(left)} items are left")
+    finally:
+        await upload(observer, kind, before)
+    return f"{len(plan)} items came back; {len(before)} restored"
 
 
-def _check_upload(context: Context, mission_type: int, name: str) -> None:
-    report = context.report
-    plan = _plan(context, mission_type)
-    result = _upload(context, mission_type, plan)
-    report.expect(
-        f"{name}: upload",
-        result == "accepted",
-        expected="a request for each item in turn, then MISSION_ACK ACCEPTED to the sender",
-        seen=result,
-    )
-    back = _download(context, mission_type)
-    first = 1 if mission_type == 0 and context.way.home_is_item_0 else 0  # home may replace it
-    same = not isinstance(back, str) and [_gist(each) for each in back[first:]] == [
-        _gist(each) for each in plan[first:]
-    ]
-    report.expect(
-        f"{name}: comes back",
-        same,
-        expected=f"the {len(plan)} items that were uploaded, same commands and places",
-        seen=back if isinstance(back, str) else f"{[_gist(each) for each in back]}",
-    )
-    probe, mark = context.probe, context.probe.mark()
-    probe.send(probe.messages.mission_clear_all_encode(probe.system_id, AUTOPILOT, mission_type))
-    ack = probe.wait(MISSION_ACK, STEP_LIMIT, since=mark)
-    left = _download(context, mission_type)
-    report.expect(
-        f"{name}: clear",
-        ack is not None and ack.type == ACCEPTED and isinstance(left, list) and len(left) <= first,
-        expected="MISSION_ACK ACCEPTED, then nothing (at most home) to download",
-        seen=("no MISSION_ACK" if ack is None else f"result {ack.type}")
-        + f", {left if isinstance(left, str) else f'{len(left)} items'}",
-    )
-
-
-def _download(context: Context, mission_type: int) -> list[Any] | str:
-    """Return the items, or a description of the failure."""
-    probe, target = context.probe, (context.probe.system_id, AUTOPILOT)
-
-    def of_type(message: Any) -> bool:
-        return bool(message.mission_type == mission_type)
-
-    asking = probe.messages.mission_request_list_encode(*target, mission_type)
-    count = _ask(context, asking, MISSION_COUNT, of_type)
-    if count is None:
-        return "no MISSION_COUNT"
-    if (count.target_system, count.target_component) != OURS:
-        return f"MISSION_COUNT for {count.target_system}/{count.target_component}"
+async def download(observer: Observer, kind: int) -> list[Item]:
+    """Return the items of a plan. Raise Wrong."""
+    out, target = observer.out, (observer.system, AUTOPILOT)
+    asking = out.mission_request_list_encode(*target, kind)
+    count = (await _ask(observer, asking, "MISSION_COUNT", lambda m: m.mission_type == kind)).count
     items = []
-    for seq in range(count.count):
-        asking = probe.messages.mission_request_int_encode(*target, seq, mission_type)
-        item = _ask(
-            context, asking, MISSION_ITEM_INT, lambda m, seq=seq: of_type(m) and m.seq == seq
-        )
-        if item is None:
-            return f"no MISSION_ITEM_INT {seq} of {count.count}"
-        items.append(item)
-    probe.send(probe.messages.mission_ack_encode(*target, ACCEPTED, mission_type))
+    for seq in range(count):
+        asking = out.mission_request_int_encode(*target, seq, kind)
+        item = await _ask(observer, asking, "MISSION_ITEM_INT", lambda m, seq=seq: m.seq == seq)
+        items.append(tuple(getattr(item, name) for name in FIELDS))
+    observer.send(out.mission_ack_encode(*target, 0, kind))
     return items
 
 
-def _upload(context: Context, mission_type: int, plan: Sequence[Any]) -> str:
-    """Upload a plan; return "accepted", or a description of the failure."""
-    probe, target = context.probe, (context.probe.system_id, AUTOPILOT)
-    mark = probe.mark()
-    probe.send(probe.messages.mission_count_encode(*target, len(plan), mission_type))
-    asked = 0
-    end = probe.now + STEP_LIMIT
-    while probe.now < end:
-        probe.pump()
-        news, mark = probe.log[mark:], probe.mark()
-        for heard in news:
-            message = heard.message
-            if heard.component != AUTOPILOT or getattr(message, "mission_type", -1) != mission_type:
-                continue
-            if heard.id in (MISSION_REQUEST, MISSION_REQUEST_INT):
-                if message.seq >= len(plan):
-                    return f"it asked for item {message.seq} of {len(plan)}"
-                probe.send(_addressed(context, plan[message.seq], message.seq))
-                asked, end = asked + 1, probe.now + STEP_LIMIT
-            elif heard.id == MISSION_ACK:
-                if (message.target_system, message.target_component) != OURS:
-                    return f"MISSION_ACK for {message.target_system}/{message.target_component}"
-                return "accepted" if message.type == ACCEPTED else f"result {message.type}"
-    return f"no MISSION_ACK; it asked {asked} times for an item of {len(plan)}"
+async def upload(observer: Observer, kind: int, plan: Sequence[Item]) -> None:
+    """Upload a plan. Raise Wrong."""
+    out, target = observer.out, (observer.system, AUTOPILOT)
+    asking = out.mission_count_encode(*target, len(plan), kind)
+    while True:
+        wanted = await _ask(
+            observer,
+            asking,
+            "MISSION_REQUEST MISSION_REQUEST_INT MISSION_ACK",
+            lambda m: m.mission_type == kind,
+        )
+        if wanted.get_type() == "MISSION_ACK":
+            ours = (out.srcSystem, out.srcComponent)
+            if wanted.type or (wanted.target_system, wanted.target_component) != ours:
+                raise Wrong(f"upload: {wanted}")
+            return
+        if wanted.seq >= len(plan):
+            raise Wrong(f"it asked for item {wanted.seq} of {len(plan)}")
+        asking = out.mission_item_int_encode(*target, wanted.seq, *plan[wanted.seq], kind)
 
 
-def _ask(context: Context, message: Any, answer: int, condition: Any) -> Any:
+async def _ask(observer: Observer, message: Any, answer: str, fits: Any) -> Any:
     for _ in range(TRIES):
-        mark = context.probe.mark()
-        context.probe.send(message)
-        found = context.probe.wait(answer, STEP_LIMIT, since=mark, condition=condition)
+        observer.send(message)
+        found = await observer.wait(answer, STEP_LIMIT, fits)
         if found is not None:
             return found
-    return None
+    raise Wrong(f"no {answer} after {message.get_type()}")
 
 
-def _plan(context: Context, mission_type: int) -> list[Any]:
-    """Return a small plan around the rover's position."""
-    place = context.probe.last(GLOBAL_POSITION_INT)
-    latitude, longitude = (place.lat, place.lon) if place is not None else (0, 0)
-    if mission_type == 0:
-        return [
-            _item(context, seq, WAYPOINT, 0.0, latitude + 300 * seq, longitude, 0)
-            for seq in range(3)
-        ]
-    if mission_type == 1:
-        return [_item(context, 0, FENCE_CIRCLE, FENCE_RADIUS, latitude, longitude, 1)]
-    return [_item(context, 0, RALLY_POINT, 0.0, latitude, longitude, 2)]
-
-
-def _item(
-    context: Context, seq: int, command: int, param1: float, x: int, y: int, mission_type: int
-) -> Any:
-    frame = GLOBAL_RELATIVE_ALT if mission_type == 0 else 0
-    yaw = math.nan if command == WAYPOINT else 0.0  # like QGroundControl: no heading
-    return context.probe.messages.mission_item_int_encode(
-        0, 0, seq, frame, command, int(seq == 0), 1, param1, 0.0, 0.0, yaw, x, y, 0.0, mission_type
-    )
-
-
-def _addressed(context: Context, item: Any, seq: int) -> Any:
-    return context.probe.messages.mission_item_int_encode(
-        context.probe.system_id,
-        AUTOPILOT,
-        seq,
-        item.frame,
-        item.command,
-        int(seq == 0 and item.mission_type == 0),
-        item.autocontinue,
-        item.param1,
-        item.param2,
-        item.param3,
-        item.param4,
-        item.x,
-        item.y,
-        item.z,
-        item.mission_type,
-    )
-
-
-def _gist(item: Any) -> tuple[int, int, int]:
-    return item.command, item.x, item.y
+def _plan(kind: int, latitude: int, longitude: int) -> list[Item]:
+    """Return a small plan around a place."""
+    command, radius, count = PLANS[kind]
+    is_mission = kind == mav.MAV_MISSION_TYPE_MISSION
+    frame = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT if is_mission else mav.MAV_FRAME_GLOBAL
+    yaw = math.nan if is_mission else 0.0  # like QGroundControl: no heading
+    same = (1, radius, 0.0, 0.0, yaw)
+    return [
+        (frame, command, int(is_mission and not n), *same, latitude + 300 * n, longitude, 0.0)
+        for n in range(count)
+    ]

@@ -8,21 +8,18 @@ order, states and the measured movement are correct; 1: some are wrong; 2: it ca
 import argparse
 from pathlib import Path
 
-from rich.console import Console
-
 from mav_tasks.basics.errors import RecordError
 from rover_sim.bullet import NO_PYBULLET, has_pybullet
 from rover_sim.demo import fast, real
 from rover_sim.demo.processes import DemoError
-from rover_sim.demo.report import draw, print_table, problems
 from rover_sim.demo.screen import Screen
-from rover_sim.demo.third_party import Place, ThirdParty
+from rover_sim.demo.third_party import problems
 from rover_sim.errors import MissingExtra
+from rover_sim.observing.picture import draw
 
 OUTPUT = "demo-output"
 PICTURE = "track.png"
-
-PIPE_WIDTH = 110  # columns, if the output is no terminal
+USAGE = 2
 
 NO_PICTURE = (
     "demo: no picture of the track: it needs matplotlib, which is not installed"
@@ -37,77 +34,53 @@ NO_FLEET = "demo: --fleet cannot be used with --fast, --web, --gui or --record"
 def main() -> int:
     """Run the demonstration; return the exit status."""
     options = _parser().parse_args()
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=PIPE_WIDTH)
+    screen = Screen()
     body = options.body or ("bullet" if has_pybullet() else "kinematic")
     if options.body is None and body == "kinematic":
-        _say(console, f"demo: {NO_PYBULLET}")
-    if options.gui and (options.fast or body != "bullet"):
-        _say(console, NO_WINDOW)
-        return 2
-    if options.web and options.fast:
-        _say(console, NO_PAGE)
-        return 2
-    if options.fleet and (options.fast or options.web or options.gui or options.record):
-        _say(console, NO_FLEET)
-        return 2
+        screen.say(f"demo: {NO_PYBULLET}")
+    others = options.web or options.gui or options.record
+    for is_wrong, words in (
+        (options.gui and (options.fast or body != "bullet"), NO_WINDOW),
+        (options.web and options.fast, NO_PAGE),
+        (options.fleet and (options.fast or others), NO_FLEET),
+    ):
+        if is_wrong:
+            screen.say(words)
+            return USAGE
     try:
-        with Screen(console) as screen:
-            if options.fleet:
-                from rover_sim.demo import fleet  # noqa: PLC0415  # needs more packages
-
-                return _judge(console, fleet.drive(screen, body=body))
-            party, track = _drive(screen, options, body)
+        wrong = _run(options, screen, body)
     except (DemoError, MissingExtra, RecordError) as error:
-        _say(console, f"demo: {error}")
-        return 2
-    picture = None if options.gui else Path(options.output).resolve() / PICTURE
-    return _conclude(console, party, track, picture)
+        screen.say(f"demo: {error}")
+        return USAGE
+    screen.say(f"demo: {wrong} wrong" if wrong else "demo: all correct")
+    return int(wrong > 0)
 
 
-def _drive(
-    screen: Screen, options: argparse.Namespace, body: str
-) -> tuple[ThirdParty, list[Place]]:
-    if options.fast:
-        return fast.drive(
-            screen,
-            body=body,
-            seed=options.seed,
-            record=options.record,
-        )
-    return real.drive(
-        screen,
-        body=body,
-        gui=options.gui,
-        seed=options.seed,
-        record=options.record,
-        web=options.web,
-    )
+def _run(options: argparse.Namespace, screen: Screen, body: str) -> int:
+    """Show it; return how much went wrong."""
+    if options.fleet:
+        from rover_sim.demo import fleet  # noqa: PLC0415  # needs more packages
 
-
-def _conclude(console: Console, party: ThirdParty, track: list[Place], picture: Path | None) -> int:
-    print_table(console, party)
-    if picture is not None and track:
-        try:
-            draw(track, picture)
-        except ImportError:
-            _say(console, NO_PICTURE)
+        return fleet.drive(screen, body=body)
+    how = {"body": body, "seed": options.seed, "record": options.record}
+    with screen.live():
+        if options.fast:
+            party, track = fast.drive(screen, **how)
         else:
-            _say(console, f"picture of the track: {picture}")
+            party, track = real.drive(screen, **how, gui=options.gui, web=options.web)
+    screen.conclude(party)
+    if track and not options.gui:
+        picture = Path(options.output).resolve() / PICTURE
+        try:
+            draw({"Track of the rover": track.places}, picture)
+        except ImportError:
+            screen.say(NO_PICTURE)
+        else:
+            screen.say(f"picture of the track: {picture}")
     wrong = problems(party)
     for problem in wrong:
-        _say(console, f"WRONG: {problem}")
-    return _judge(console, len(wrong))
-
-
-def _judge(console: Console, wrong: int) -> int:
-    _say(console, f"demo: {wrong} wrong" if wrong else "demo: all correct")
-    return 1 if wrong else 0
-
-
-def _say(console: Console, text: str) -> None:
-    console.print(text, soft_wrap=True, markup=False, highlight=False)
+        screen.say(f"WRONG: {problem}")
+    return len(wrong)
 
 
 def _parser() -> argparse.ArgumentParser:

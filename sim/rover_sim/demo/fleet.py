@@ -5,8 +5,6 @@ submitted at one gateway, whichever has the rovers.
 """
 
 import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +15,7 @@ from mav_tasks.basics.errors import MavTasksError, NoAnswer
 from mav_tasks.client.sync import SyncClient, SyncTask
 from mav_tasks.kinds import Move
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
-from rover_sim.demo.processes import STOP_LIMIT, DemoError, free_ports, process
+from rover_sim.demo.processes import DemoError, free_ports, module, until
 from rover_sim.demo.screen import Screen
 from rover_sim.postgres import PostgresServer, installed
 
@@ -27,7 +25,6 @@ METRES = 4.0
 DRIVES = TaskState.EXECUTING
 DRIVEN = 1.5  # s, before a gateway is killed
 LIMIT = 120.0  # s, for each part
-LOOK = 0.1  # s
 
 
 def drive(screen: Screen, *, body: str) -> int:
@@ -48,20 +45,26 @@ def _drive(screen: Screen, ends: ExitStack, *, body: str) -> int:
     url = database.create_database("fleet")
     screen.say(f"PostgreSQL: {url}")
     rover_port, *ports = free_ports(1 + len(GATEWAYS))
-    rovers = [sys.executable, "-m", "rover_sim", "--port", str(rover_port), "--body", body]
-    rovers += ["--count", str(ROVERS)]
-    ends.enter_context(process(rovers, folder / "rovers.log"))
+    rovers = f"--port {rover_port} --body {body} --count {ROVERS}"
+    ends.enter_context(module("rover_sim", rovers, folder=folder))
     gateways = []
     for name, port in zip(GATEWAYS, ports, strict=True):
-        gateways.append(_Gateway(folder, name, port, rover_port, url))
-        ends.enter_context(closing(gateways[-1]))
+        text = f"serve --config= --gateway {name} --no-push --set rules.on_takeover=resume"
+        text += f" --client udpin:127.0.0.1:{port} --vehicle udpout:127.0.0.1:{rover_port} --store"
+        # its record of halts must not lie among those of the user's servers
+        env = {**os.environ, "XDG_DATA_HOME": str(folder / name)}
+        gateway = ends.enter_context(module("mav_tasks.cli", text, url, folder=folder, env=env))
+        gateway.said(f"as gateway {name}", within=LIMIT)
+        gateways.append(gateway)
         # the second begins when the first has all of them, or it might get them instead
-        _until(
-            lambda: len(_holders(url).get(GATEWAYS[0], ())) == ROVERS, what="rovers that are held"
+        until(
+            lambda: len(_holders(url).get(GATEWAYS[0], ())) == ROVERS,
+            within=LIMIT,
+            what="rovers that are held",
         )
     killed, survivor = GATEWAYS
     client = ends.enter_context(SyncClient(f"udpout:127.0.0.1:{ports[-1]}", timeout=LIMIT))
-    _until(lambda: _are_ready(client), what="rovers that are ready")
+    until(lambda: _are_ready(client), within=LIMIT, what="rovers that are ready")
     for name in GATEWAYS:
         screen.say(f"gateway {name} has {_named(_holders(url).get(name, ()))}")
     tasks = {
@@ -69,62 +72,31 @@ def _drive(screen: Screen, ends: ExitStack, *, body: str) -> int:
     }
     told = ", ".join(f"{task.id} for rover {vehicle}" for vehicle, task in tasks.items())
     screen.say(f"submitted at gateway {survivor}: task {told}: move {METRES:g} m")
-    _until(lambda: _all(client, tasks, DRIVES.__eq__), what="rovers that drive")
+    until(lambda: _all(client, tasks, DRIVES.__eq__), within=LIMIT, what="rovers that drive")
     time.sleep(DRIVEN)
     screen.say(f"the rovers drive; killing gateway {killed} now (SIGKILL)")
     began = time.monotonic()
     gateways[0].kill()
-    _until(lambda: len(_holders(url).get(survivor, ())) == ROVERS, what=f"gateway {survivor}")
+    until(
+        lambda: len(_holders(url).get(survivor, ())) == ROVERS,
+        within=LIMIT,
+        what=f"gateway {survivor}",
+    )
     screen.say(
         f"gateway {survivor} has {_named(tuple(tasks))} after {time.monotonic() - began:.1f} s:"
         " it stops them, and their tasks go on from there"
     )
-    _until(lambda: _all(client, tasks, TERMINAL.__contains__), what="the end of all tasks")
+    until(
+        lambda: _all(client, tasks, TERMINAL.__contains__),
+        within=LIMIT,
+        what="the end of all tasks",
+    )
     wrong = 0
     for vehicle, task in tasks.items():
         status = client.status(task.id, vehicle=vehicle)
         wrong += status.state is not TaskState.COMPLETED
         screen.say(f"rover {vehicle}: task {task.id} {status.state.name.lower()}")
     return wrong
-
-
-class _Gateway:
-    """A gateway's process, which may be killed."""
-
-    def __init__(
-        self, folder: Path, name: str, client_port: int, rover_port: int, url: str
-    ) -> None:
-        self.name = name
-        command = [sys.executable, "-m", "mav_tasks.cli", "serve", "--config", ""]
-        command += ["--gateway", name, "--store", url, "--no-push"]
-        command += ["--client", f"udpin:127.0.0.1:{client_port}"]
-        command += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
-        command += ["--set", "rules.on_takeover=resume"]
-        # its record of halts must not lie among those of the user's servers
-        environment = {**os.environ, "XDG_DATA_HOME": str(folder / name)}
-        self._log = folder / f"{name}.log"
-        with self._log.open("wb") as output:
-            self._process = subprocess.Popen(
-                command, stdout=output, stderr=subprocess.STDOUT, env=environment
-            )
-        _until(self._has_begun, what=f"gateway {name}")
-
-    def kill(self) -> None:
-        """End it as a crash would."""
-        self._process.kill()
-        self._process.wait()
-
-    def close(self) -> None:
-        """End it, if it runs."""
-        self._process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(STOP_LIMIT)
-        self.kill()
-
-    def _has_begun(self) -> bool:
-        if self._process.poll() is not None:
-            raise DemoError(f"gateway {self.name} ended: {self._log.read_text(errors='replace')}")
-        return f"as gateway {self.name}" in self._log.read_text(errors="replace")
 
 
 def _holders(url: str) -> dict[str, list[int]]:
@@ -162,11 +134,3 @@ def _all(
             fits(client.status(task.id, vehicle=vehicle).state) for vehicle, task in tasks.items()
         )
     return False
-
-
-def _until(condition: Callable[[], bool], *, what: str) -> None:
-    end = time.monotonic() + LIMIT
-    while not condition():
-        if time.monotonic() > end:
-            raise DemoError(f"waited {LIMIT:.0f} s for {what}")
-        time.sleep(LOOK)

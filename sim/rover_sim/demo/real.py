@@ -1,93 +1,107 @@
-"""The demonstration in real time: server and rover are separate processes, connected by UDP."""
+"""The demonstration in real time: server, rover and page are separate processes."""
 
-import csv
+import asyncio
 import os
+import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+import webbrowser
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
-os.environ["MAVLINK20"] = "1"  # pymavlink's switch, read when it is imported
-
-from pymavlink import mavutil
-
-from rover_sim.demo.page import open_browser, page, stay
-from rover_sim.demo.processes import free_ports, process
+from mav_tasks.links.link_limits import TO_CLIENTS
+from mav_tasks.links.url import parse_url
+from rover_sim.demo.fast import follow
+from rover_sim.demo.processes import LOOK, Process, free_ports, module
 from rover_sim.demo.screen import Screen
-from rover_sim.demo.third_party import Place, ThirdParty
+from rover_sim.demo.third_party import ThirdParty
+from rover_sim.observing.observer import Observer
+from rover_sim.observing.track import Track
+from rover_sim.observing.truth import from_file
 
-TIME_LIMIT = 85.0  # s, for everything
-REFRESH = 0.2  # s
+STARTS_WITHIN = 20.0  # s
+PAGE_PORT = 8560  # the page's usual one
 
 
 def drive(
     screen: Screen, *, body: str, gui: bool, seed: int, record: str, web: bool
-) -> tuple[ThirdParty, list[Place]]:
+) -> tuple[ThirdParty, Track]:
     """Run server, rover and third party; return the third party and the true track.
 
     ``web``: serve the web page, too, and go on with it until Ctrl-C.
     """
-    with tempfile.TemporaryDirectory(prefix="mav-tasks-demo-") as folder:
-        truth_file = Path(folder) / "truth.csv"
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mav-tasks-demo-")))
+        truth, store = (
+            str(folder / "truth.csv"),
+            str(folder / "demo.sqlite3") if web else ":memory:",
+        )
+        running: list[Process] = []
+
+        def start(name: str, text: str, *more: str) -> Process:
+            running.append(stack.enter_context(module(name, text, *more, folder=folder)))
+            return running[-1]
+
         rover_port, client_port = free_ports(2)
-        rover = [sys.executable, "-m", "rover_sim", "--port", str(rover_port), "--body", body]
-        rover += ["--truth", str(truth_file)]
-        rover += ["--seed", str(seed), "--friction-variation", "0.3"] if seed else []
-        rover += ["--gui"] if gui else []
-        server = [sys.executable, "-m", "mav_tasks.cli", "serve", "--config", ""]
-        server += ["--client", f"udpin:127.0.0.1:{client_port}"]
-        store = str(Path(folder) / "demo.sqlite3") if web else ":memory:"
-        server += ["--vehicle", f"udpout:127.0.0.1:{rover_port}", "--store", store]
-        server += ["--record", record] if record else []
-        with (
-            process(rover, Path(folder) / "rover.log") as check_rover,
-            process(server, Path(folder) / "server.log") as check_server,
-        ):
-            screen.say(f"rover: {body} body on UDP {rover_port}; server on UDP {client_port}")
-            screen.say("a QGroundControl on this machine will see the rover")
-            checks = (check_rover, check_server)
-            if not web:
-                return _watch(screen, client_port, truth_file, checks), read_track(truth_file)
-            with page(f"udpout:127.0.0.1:{client_port}", store, Path(folder)) as (url, check_page):
-                screen.say(f"web page: {url}")
-                open_browser(url)
-                party = _watch(screen, client_port, truth_file, (*checks, check_page))
-                screen.say("the rover, the server and the page go on: press Ctrl-C to end them")
-                stay((*checks, check_page))
-                return party, read_track(truth_file)
+        text = f"--port {rover_port} --body {body}" + (" --gui" if gui else "")
+        text += f" --seed {seed} --friction-variation 0.3" if seed else ""
+        rover = start("rover_sim", text, "--truth", truth)
+        text = f"serve --config= --client udpin:127.0.0.1:{client_port}"
+        text += f" --vehicle udpout:127.0.0.1:{rover_port} --store"
+        start("mav_tasks.cli", text, store, *(("--record", record) if record else ()))
+        screen.say(f"rover: {body} body on UDP {rover_port}; server on UDP {client_port}")
+        screen.say("a QGroundControl on this machine will see the rover")
+        server = f"udpout:127.0.0.1:{client_port}"
+        if web:
+            keys = folder / "keys.toml"  # none: nobody needs a token, whatever keys the user has
+            keys.touch(mode=0o600)
+            port = PAGE_PORT if _is_free(PAGE_PORT) else 0
+            text = f"web --server {server} --listen 127.0.0.1:{port} --store"
+            page = start("mav_tasks.cli", text, store, "--keys", str(keys))
+            url = page.said(r"web page: (\S+)", within=STARTS_WITHIN)[1]
+            screen.say(f"web page: {url}")
+            _open_browser(url)
+        rover.said(" on udp", within=STARTS_WITHIN)
+        found = asyncio.run(_watch(screen, server, Path(truth), running))
+        if web:
+            screen.say("the rover, the server and the page go on: press Ctrl-C to end them")
+            with suppress(KeyboardInterrupt):
+                while True:
+                    _check(running)
+                    time.sleep(LOOK)
+        return found
 
 
-def _watch(
-    screen: Screen, port: int, truth_file: Path, checks: tuple[Callable[[], None], ...]
-) -> ThirdParty:
-    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=255)
-    try:
-        party = ThirdParty(link.mav, lambda: read_track(truth_file)[-1], screen.say)
-        end = time.monotonic() + TIME_LIMIT
-        next_refresh = 0.0
-        while not party.is_over:
-            now = time.monotonic()
-            if now > end:
-                screen.say(f"gave up after {TIME_LIMIT:.0f} s")
-                break
-            party.step(now)
-            message = link.recv_match(blocking=True, timeout=0.1)
-            if message is not None:
-                party.take(message)
-            if now >= next_refresh:
-                next_refresh = now + REFRESH
-                screen.update(party)
-                for check in checks:
-                    check()
-        screen.update(party)
-        return party
-    finally:
-        link.close()
+async def _watch(
+    screen: Screen, server: str, truth: Path, running: Sequence[Process]
+) -> tuple[ThirdParty, Track]:
+    observer = Observer(parse_url(server).open(limits=TO_CLIENTS))
+    with from_file(truth) as track:
+        party = ThirdParty(observer, lambda: track.last, screen.say)
+        await follow(party, screen, lambda: _check(running))
+        observer.close()
+        return party, track
 
 
-def read_track(truth_file: Path) -> list[Place]:
-    """Return the true poses that the rover has written so far, without an incomplete last line."""
-    text = truth_file.read_text(encoding="ascii") if truth_file.exists() else ""
-    rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
-    return [Place(float(r["north"]), float(r["east"]), float(r["yaw"])) for r in rows]
+def _check(running: Sequence[Process]) -> None:
+    for each in running:
+        each.check()
+
+
+def _is_free(port: int) -> bool:
+    """Return whether nobody serves on a TCP port of the loopback."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return True
+        return False
+
+
+def _open_browser(url: str) -> None:
+    """Show the page in the user's browser, if there is a screen."""
+    screens = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))
+    if sys.platform == "darwin" or any(screens):
+        webbrowser.open(url)

@@ -1,21 +1,21 @@
-"""A third party: stock pymavlink with its `common` dialect, and no code of mav-tasks.
+"""A third party: pymavlink's stock messages over a link, and no knowledge of mav-tasks' own.
 
-It submits each task once the previous one is acknowledged, and records their states. The caller
-owns the link: this file needs only pymavlink's `mav` object and the received messages.
+It submits each task once the previous one is acknowledged, and records their states.
 """
 
 import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+
+from rover_sim.observing.observer import AUTOPILOT, Answer, Heard, Observer
+from rover_sim.observing.track import Place
 
 TASK_MOVE, TASK_ROTATE = 54000, 54001
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL = 512, 511
-TASK_STATUS = 54000
-ROVER, TASK_SERVER = 1, 191
-ACCEPTED = 0
-STATES = (
+TASK_STATUS, TASK_STATUS_FORM = 54000, "<5I4f4H10B50sI"
+TASK_SERVER = 191
+STATES: tuple[str, ...] = (
     "unknown",
     "scheduled",
     "blocked",
@@ -23,19 +23,13 @@ STATES = (
     "starting",
     "executing",
     "paused",
-    "cancelling",
-    "held",
-    "completed",
-    "failed",
-    "cancelled",
-    "killed",
-    "expired",
 )
+STATES += ("cancelling", "held", "completed", "failed", "cancelled", "killed", "expired")
 STARTING, EXECUTING, FIRST_OVER = 4, 5, 9
 POSITIONS = 5  # LOCAL_POSITION_NED messages until the rover counts as present
 PROGRESS_INTERVAL_US = 200_000
-QUEUE_INTERVAL = 0.5  # s
-HEARTBEAT_INTERVAL = 1.0  # s
+ASK_AGAIN = 0.5  # s
+PATIENCE = 85.0  # s, for everything
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,30 +38,20 @@ class Leg:
 
     name: str
     command: int
-    amount: float  # m or degrees
+    amount: float
+    unit: str
     priority: int
+    tolerance: float  # the rover's own estimate is off by 2 to 4 cm
 
-    @property
-    def unit(self) -> str:
-        """The unit of the amount."""
-        return "m" if self.command == TASK_MOVE else "deg"
+    def __str__(self) -> str:
+        return f"{self.name} {self.amount:g} {self.unit}"
 
 
 LEGS = (
-    Leg("forward", TASK_MOVE, 2.0, 3),
-    Leg("rotate", TASK_ROTATE, 90.0, 8),
-    Leg("forward", TASK_MOVE, 1.5, 5),
+    Leg("forward", TASK_MOVE, 2.0, "m", 3, 0.05),
+    Leg("rotate", TASK_ROTATE, 90.0, "deg", 8, 1.0),
+    Leg("forward", TASK_MOVE, 1.5, "m", 5, 0.05),
 )
-ORDER = (0, 1, 2)  # of execution, as indices of LEGS
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """True pose of the rover: metres and radians."""
-
-    north: float
-    east: float
-    yaw: float
 
 
 @dataclass(slots=True)
@@ -75,116 +59,117 @@ class Seen:
     """The third party's knowledge of one of its tasks."""
 
     leg: Leg
-    result: int | None = None
+    is_accepted: bool | None = None
     task_id: int = 0
     state: int = 0
     text: str = ""
     progress: int = 0
-    queue_position: int | None = None
-    execution_time: float = math.nan
+    position: int | None = None  # in the queue
+    seconds: float = math.nan
     began: Place | None = None
     ended: Place | None = None
+
+    @property
+    def measured(self) -> float:
+        """Metres driven along the first heading, or degrees turned; NaN if unknown."""
+        one, other = self.began, self.ended
+        if one is None or other is None:
+            return math.nan
+        if self.leg.command == TASK_ROTATE:
+            return math.degrees(math.remainder(other.yaw - one.yaw, math.tau))
+        north, east = other.north - one.north, other.east - one.east
+        return north * math.cos(one.yaw) + east * math.sin(one.yaw)
 
 
 @dataclass
 class ThirdParty:
-    """Submits LEGS and tracks them; ``truth`` returns the true pose, ``say`` prints a line."""
+    """Submits LEGS and follows them; ``truth`` returns the true pose, ``say`` prints a line."""
 
-    mav: Any
+    observer: Observer
     truth: Callable[[], Place]
     say: Callable[[str], None]
     tasks: list[Seen] = field(default_factory=lambda: [Seen(leg) for leg in LEGS])
-    order: list[int] = field(default_factory=list)
+    order: list[int] = field(default_factory=list)  # of execution, as indices of LEGS
     _positions: int = 0
-    _submitted: int = 0
-    _next_heartbeat: float = 0.0
-    _next_look: float = 0.0
+
+    async def run(self) -> None:
+        """Submit, and wait for the end; give up after PATIENCE."""
+        self.observer.listeners.append(self._take)
+        end = self.observer.now + PATIENCE
+        await self.observer.until(lambda: self._positions >= POSITIONS, PATIENCE)
+        await self._command(SET_MESSAGE_INTERVAL, TASK_STATUS, PROGRESS_INTERVAL_US)
+        first = self.tasks[0]
+        for task in self.tasks:
+            await self._submit(task)
+            if first.is_accepted:  # it must start at once, so that later ones wait
+                await self.observer.until(lambda: first.state >= STARTING, PATIENCE)
+        while not self.is_over and self.observer.now < end:
+            for task in self.tasks:
+                if task.state < EXECUTING:
+                    await self._command(REQUEST_MESSAGE, TASK_STATUS, task.task_id)
+            await self.observer.until(lambda: self.is_over, ASK_AGAIN)
+        if not self.is_over:
+            self.say(f"gave up after {PATIENCE:.0f} s")
 
     @property
     def is_over(self) -> bool:
         """Whether every task has ended or was refused."""
-        return all(
-            task.state >= FIRST_OVER or task.result not in (None, ACCEPTED) for task in self.tasks
-        )
+        return all(task.state >= FIRST_OVER or task.is_accepted is False for task in self.tasks)
 
-    def step(self, now: float) -> None:
-        """Send the messages that are due."""
-        if now >= self._next_heartbeat:
-            self._next_heartbeat = now + HEARTBEAT_INTERVAL
-            self.mav.heartbeat_send(6, 8, 0, 0, 4)
-        if self._positions >= POSITIONS:
-            self._submit_next()
-        if self._submitted == len(LEGS) and now >= self._next_look:
-            self._next_look = now + QUEUE_INTERVAL
-            for task in self.tasks:
-                if task.task_id and task.state < EXECUTING:
-                    self._command(REQUEST_MESSAGE, TASK_STATUS, task.task_id)
-
-    def take(self, message: Any) -> None:
-        """Process one message."""
-        match message.get_type():
-            case "LOCAL_POSITION_NED":
-                self._positions += 1
-            case "COMMAND_ACK" if message.command in (TASK_MOVE, TASK_ROTATE):
-                self._take_ack(message)
-            case "STATUSTEXT" if not message.text.startswith("Task "):  # TASK_STATUS has it
-                who = "server" if message.get_srcComponent() == TASK_SERVER else "rover"
-                self.say(f"{who} says: {message.text}")
-            case "UNKNOWN_54000":
-                self._take_status(message)
-
-    def _submit_next(self) -> None:
-        if self._submitted == len(LEGS):
-            return
-        if self._submitted and self.tasks[self._submitted - 1].result is None:
-            return  # one at a time, so that each ack belongs to a known task
-        if self._submitted and self.tasks[0].state < STARTING:
-            return  # the first one must start at once, so that later ones wait
-        if self._submitted == 0:
-            self._command(SET_MESSAGE_INTERVAL, TASK_STATUS, PROGRESS_INTERVAL_US)
-        leg = LEGS[self._submitted]
-        self._submitted += 1
-        self._command(leg.command, leg.amount, 0, 0, 0, 0, 0, leg.priority)
-
-    def _take_ack(self, ack: Any) -> None:
-        task = next((task for task in self.tasks if task.result is None), None)
-        if task is None or task.leg.command != ack.command:
-            self.say(f"unexpected COMMAND_ACK: {ack}")
-            return
-        task.result, task.task_id = ack.result, ack.result_param2
+    async def _submit(self, task: Seen) -> None:
         leg = task.leg
-        answer = "ACCEPTED" if ack.result == ACCEPTED else f"refused with result {ack.result}"
-        self.say(
-            f"COMMAND_ACK {answer}: {leg.name} {leg.amount:g} {leg.unit} at priority "
-            f"{leg.priority} is task {ack.result_param2}"
-        )
+        answer = await self._command(leg.command, leg.amount, 0, 0, 0, 0, 0, leg.priority)
+        task.is_accepted, task.task_id = answer.is_accepted, answer.extra
+        result = str(answer).partition(" ")[0]
+        self.say(f"COMMAND_ACK {result}: {leg} at priority {leg.priority} is task {task.task_id}")
 
-    def _take_status(self, message: Any) -> None:
-        packet = bytes(message.get_msgbuf())  # a signature may follow the payload
-        payload = packet[10 : 10 + packet[1]].ljust(108, b"\0")[:108]
-        fields = struct.unpack("<5I4f4H10B50sI", payload)
-        task_id, execution_time, position = fields[1], fields[8], fields[10]
-        state, progress = fields[15], fields[18]
-        text = fields[23].split(b"\0")[0].decode("utf-8", "replace")
+    async def _command(self, number: int, *params: float) -> Answer:
+        return await self.observer.command(number, *params, component=TASK_SERVER)
+
+    def _take(self, heard: Heard) -> None:
+        component = heard.packet.source.component_id
+        if heard.name == "LOCAL_POSITION_NED":
+            self._positions += component == AUTOPILOT
+        elif heard.name == "STATUSTEXT" and not heard.message.text.startswith("Task "):
+            who = "server" if component == TASK_SERVER else "rover"
+            self.say(f"{who} says: {heard.message.text}")
+        elif heard.packet.message_id == TASK_STATUS:
+            self._take_status(heard.packet.payload)
+
+    def _take_status(self, payload: bytes) -> None:
+        size = struct.calcsize(TASK_STATUS_FORM)
+        fields = struct.unpack(TASK_STATUS_FORM, payload[:size].ljust(size, b"\0"))
+        state, text = fields[15], fields[23].split(b"\0")[0].decode("utf-8", "replace")
         for index, task in enumerate(self.tasks):
-            if task.task_id == task_id and state >= task.state:
-                task.progress = progress
-                task.execution_time = execution_time
-                task.queue_position = None if position == 0xFFFF else position
-                if state != task.state:
-                    task.state = state
-                    self._enter(index, task)
-                if text != task.text:
-                    task.text = text
-                    self.say(f"task {task.task_id}: {text}")
+            if task.task_id != fields[1] or state < task.state:
+                continue
+            task.seconds, task.progress = fields[8], fields[18]
+            task.position = None if fields[10] == 0xFFFF else fields[10]
+            if state != task.state and state == EXECUTING:
+                task.began = self.truth()
+                self.order.append(index)
+            elif state != task.state and state >= FIRST_OVER:
+                task.ended = self.truth()
+            if text != task.text:
+                self.say(f"task {task.task_id}: {text}")
+            task.state, task.text = state, text
 
-    def _enter(self, index: int, task: Seen) -> None:
-        if task.state == EXECUTING:
-            task.began = self.truth()
-            self.order.append(index)
-        elif task.state >= FIRST_OVER:
-            task.ended = self.truth()
 
-    def _command(self, command: int, *params: float) -> None:
-        filled = (*params, *(0.0,) * (7 - len(params)))
-        self.mav.command_long_send(ROVER, TASK_SERVER, command, 0, *filled)
+def problems(party: ThirdParty) -> list[str]:
+    """Return a description of every deviation from the expected result."""
+    found = []
+    ids = [task.task_id for task in party.tasks]
+    if not all(task.is_accepted for task in party.tasks):
+        found.append("a submission was not accepted")
+    if len(set(ids)) != len(ids) or 0 in ids:
+        found.append(f"task ids {ids} are not three different ones")
+    if party.order != [0, 1, 2]:
+        found.append(f"order of execution {[ids[i] for i in party.order]}, not {ids}")
+    for task in party.tasks:
+        label, leg = f"task {task.task_id} ({task.leg.name})", task.leg
+        if STATES[task.state] != "completed":
+            found.append(f"{label} is {STATES[task.state]}, not completed")
+        error = abs(task.measured - leg.amount)
+        if not error <= leg.tolerance:
+            found.append(f"{label} is off by {error:.3f} {leg.unit}, allowed {leg.tolerance}")
+    return found

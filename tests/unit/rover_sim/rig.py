@@ -1,15 +1,10 @@
-"""The driver of simulated rovers in virtual time: MAVLink bytes in, bytes and true pose out.
+"""The driver of simulated rovers in virtual time: MAVLink bytes in, bytes and true pose out."""
 
-``Rig`` is a rover with a client on its link, and ``VirtualWire`` is a link for check_vehicle on
-which things go wrong.
-"""
-
-from collections import deque
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from functools import partial
 from math import nan
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -18,9 +13,6 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import BodyState, Pose
-from rover_sim.check_vehicle.context import Options
-from rover_sim.check_vehicle.contract import GROUPS, check_vehicle
-from rover_sim.check_vehicle.report import Line, Report
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import ARDUPILOT, PX4, Persona
 from rover_sim.realism import NO_BOOT, Realism
@@ -212,81 +204,3 @@ def local_target(
 
 def velocity(north: float, east: float = 0.0) -> m.SetPositionTargetLocalNed:
     return local_target(VELOCITY, velocity=(north, east))
-
-
-# a wire for check_vehicle
-
-Says = Callable[[Message], Iterable[Message]]
-Hears = Callable[[Message], Message | None]
-
-
-class VirtualWire:
-    """Implements check_vehicle's ``Wire``. A rover says, hears and sends what the hooks make of it.
-
-    No setpoint may move a rover that does not say that it is armed.
-    """
-
-    def __init__(
-        self,
-        persona: Persona,
-        *,
-        says: Says = lambda message: [message],
-        hears: Hears = lambda message: message,
-        at: Callable[["VirtualWire"], None] = lambda _: None,
-    ) -> None:
-        body = kinematic_body(persona.frame, start=Pose(yaw=1.0), slip=0.3, seed=None)
-        self.vehicle = make_vehicle(body, system_id=1, persona=persona, now=START)
-        self.setpoints: list[m.SetPositionTargetLocalNed] = []
-        self.asked: list[Message] = []
-        self._shown_armed = False
-        self._now = START
-        self._says, self._hears, self._at = says, hears, at
-        self._inbox: deque[bytes] = deque()
-        self._decoder, self._encoder = Decoder(), Encoder(ROVER)
-
-    def now(self) -> float:
-        return self._now
-
-    def send(self, data: bytes) -> None:
-        for packet in split_datagram(data):
-            message = self._decoder.decode(packet)
-            assert message is not None
-            self.asked.append(message)
-            if isinstance(message, m.SetPositionTargetLocalNed):
-                self._watch(message)
-            heard = self._hears(message)
-            if heard is not None:
-                again = Encoder(packet.source, first_seq=packet.seq).encode(heard)
-                self.vehicle.receive(again, "checker", now=self._now)
-        self._listen()
-
-    def receive(self, within: float) -> bytes:
-        self._at(self)
-        end = self._now + within
-        while not self._inbox and self._now < end:
-            self._now = min(end, max(self._now, self.vehicle.next_deadline()))
-            self.vehicle.handle_deadline(now=self._now)
-            self._listen()
-        return self._inbox.popleft() if self._inbox else b""
-
-    def _listen(self) -> None:
-        for _, data in self.vehicle.take_packets():
-            message: Any = self._decoder.decode(split_datagram(data)[0])
-            for said in self._says(message):
-                if isinstance(said, m.Heartbeat):
-                    self._shown_armed = bool(said.base_mode & ARMED)
-                self._inbox.append(self._encoder.encode(said))
-
-    def _watch(self, message: m.SetPositionTargetLocalNed) -> None:
-        self.setpoints.append(message)
-        is_zero = (message.vx, message.vy, message.yaw_rate) == (0.0, 0.0, 0.0)
-        ignores_position = message.type_mask & 0x0007
-        assert self._shown_armed or (is_zero and ignores_position), "moves a disarmed rover"
-
-
-def run(wire: VirtualWire, options: Options, groups: tuple[str, ...] = GROUPS) -> Report:
-    """Run the contract over a wire."""
-    lines: list[Line] = []
-    report = check_vehicle(wire, options, system_id=None, show=lines.append, groups=groups)
-    assert lines == report.lines
-    return report
