@@ -47,7 +47,7 @@ UNLIMITED = Settings(
 )
 OBSERVED = Settings(clients=Clients(packet_rate=1e6), roles=Roles(unsigned="observer"))
 WAITING = 10  # tasks
-BEAT, TELEMETRY = 1.0, 0.05  # s
+TELEMETRY, A_SECOND = 0.05, 20  # s, and how often
 MEETING = 5.0  # s, after which the server knows the rover
 SETTLED = 30.0  # s, after which the server's requests to the rover have ended
 APART = 0.1  # s, between the submissions of the waiting tasks
@@ -101,8 +101,7 @@ class World:
         self.engine = Engine(settings, now=0.0)
         self._base_mode = base_mode
         self._rover, self._client = Encoder(Address(1, 1)).encode, Encoder(Address(245, 190)).encode
-        self._events = self._submitted = 0
-        self._beat_at = self._telemetry_at = 0.0
+        self._events = self._submitted = self._ticks = 0
         self.take(LinkChanged(VEHICLES, LinkSide.VEHICLES, True, (ROVER,)))
         self.take(LinkChanged(CLIENTS, LinkSide.CLIENTS, True))
 
@@ -134,7 +133,7 @@ class World:
         end = self.now + seconds
         while self.now < end:
             due = self.engine.next_deadline() or end
-            self.now = min(end, due, self._beat_at, self._telemetry_at)
+            self.now = min(end, due, self._ticks * TELEMETRY)
             if due <= self.now:
                 engine, now = self.engine, self.now
                 with measured():
@@ -145,17 +144,16 @@ class World:
                 self._events += len(events)
                 self._hear(packets)
                 self.drain()
-            if self._telemetry_at <= self.now:
-                self._telemetry_at += TELEMETRY
+            if self._ticks * TELEMETRY <= self.now:
                 boot = round(self.now * 1000)
                 self.say(m.Attitude(boot, 0, 0, 0, 0, 0, 0))
                 self.say(m.LocalPositionNed(boot, 0, 0, 0, 0, 0, 0))
                 self.say(m.GlobalPositionInt(boot, 0, 0, 0, 0, 0, 0, 0, 0))
-            if self._beat_at <= self.now:
-                self._beat_at += BEAT
-                self.say(m.Heartbeat(10, 3, self._base_mode, HOLD, 3, 3))
-                beat = self._client(m.Heartbeat(6, 8, 0, 0, 4, 3))
-                self.take(Packets(CLIENTS, [(CLIENT, beat)]))
+                if self._ticks % A_SECOND == 0:
+                    self.say(m.Heartbeat(10, 3, self._base_mode, HOLD, 3, 3))
+                    beat = self._client(m.Heartbeat(6, 8, 0, 0, 4, 3))
+                    self.take(Packets(CLIENTS, [(CLIENT, beat)]))
+                self._ticks += 1
 
     def say(self, message: m.Message) -> None:
         """Send a message of the rover."""
@@ -181,15 +179,9 @@ class World:
         for outgoing in packets:
             for packet in split_datagram(outgoing.data) if outgoing.link == VEHICLES else ():
                 message = Decoder().decode(packet)
-                if not isinstance(message, m.CommandLong):
-                    continue
-                answers: list[m.Message] = [m.CommandAck(message.command, 0)]
-                if (message.command, message.param1) == (REQUEST, m.AutopilotVersion.id):
-                    ids = [0] * 8, [0] * 8, [0] * 8
-                    answers.append(m.AutopilotVersion(0, 1, 1, 1, 1, *ids, 1, 1, 1))
-                for answer in answers:
-                    told = Packets(VEHICLES, [(ROVER, self._rover(answer))])
-                    self.engine.handle(told, now=self.now)
+                if isinstance(message, m.CommandLong):
+                    accepted = self._rover(m.CommandAck(message.command, 0))
+                    self.engine.handle(Packets(VEHICLES, [(ROVER, accepted)]), now=self.now)
 
 
 def with_queue() -> World:

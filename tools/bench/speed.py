@@ -57,14 +57,15 @@ FLOOD = 5_000  # packets/s
 ROVERS = (1, 20, 100)
 RATE = 40  # packets/s of each rover
 SETTLING, WATCHED = 3.0, 10.0  # s
-TELEMETRY: tuple[m.Message, ...] = (
-    m.LocalPositionNed(1000, 1.5, -2.5, 0.01, 0.3, 0.1, 0.001),
-    m.Attitude(1000, 0.01, 0.02, 1.2, 0.001, 0.002, 0.3),
-    m.GlobalPositionInt(1000, 473977420, 85455940, 488000, 10, 30, 10, 0, 6900),
-    m.VfrHud(0.0, 0.3, 68, 20, 488.0, 0.0),
-)
+LOCAL = m.LocalPositionNed(1000, 1.5, -2.5, 0.01, 0.3, 0.1, 0.001)
+ATTITUDE = m.Attitude(1000, 0.01, 0.02, 1.2, 0.001, 0.002, 0.3)
+GLOBAL = m.GlobalPositionInt(1000, 473977420, 85455940, 488000, 10, 30, 10, 0, 6900)
+HUD = m.VfrHud(0.0, 0.3, 68, 20, 488.0, 0.0)
+RC = m.RcChannels(1000, 8, *([1500] * 8 + [65535] * 10 + [255]))
+#: about as often as a rover sends them
+TELEMETRY = (LOCAL, ATTITUDE, RC, LOCAL, ATTITUDE, GLOBAL, LOCAL, ATTITUDE, RC, HUD)
 STARTS = 5
-CALLS = ("queue", "status 1", "vehicles", "submit wait 0.1")
+CALLS = ("submit wait 0.1", "status 1", "queue", "vehicles")
 LIBRARY = "from mav_tasks import Client, Move"
 
 
