@@ -7,25 +7,26 @@
 
 The mutants are a random sample, the same for the same seed and source. First each test runs once,
 which records the mutants whose lines it reaches; then for each mutant those tests run, quick ones
-first, until one fails. Only code within functions is mutated, not tables of modules. Tests with
-real processes are left out. Exit code 0: measured; 2: usage error.
+first, until one fails, in a process that imports the changed module. Only code within functions is
+mutated, not tables of modules. Tests with real processes are left out. Exit code 0: measured.
 """
 
 import argparse
 import ast
-import gc
+import builtins
 import json
 import os
 import random
+import subprocess
 import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields
-from functools import cache, partial
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import CodeType, FunctionType
 from typing import Any
 
 import pytest
@@ -130,178 +131,117 @@ def survivors(figures: Path) -> list[Mutant]:
     return [mutant for mutant in found if mutant in present]
 
 
-def mutated(mutant: Mutant) -> ast.Module:
-    """Return the module with the fault."""
-    tree = parsed(mutant.path)
-    node = list(ast.walk(tree))[mutant.node]
-    made = fault(node)
-    assert made is not None, mutant
-    vars(node).update(made[1])
-    return tree
-
-
-def probed(path: str, here: dict[int, Mutant]) -> ast.Module:
-    """Return a module in which the statements with mutants say that they are reached."""
+def changed(path: str, faults: list[int], probes: dict[int, int]) -> ast.Module:
+    """Return a module with faults at nodes, and with calls that tell when others are reached."""
     tree = parsed(path)
     nodes = list(ast.walk(tree))
     parents = {child: node for node in nodes for child in ast.iter_child_nodes(node)}
-    for number, mutant in here.items():
-        statement = nodes[mutant.node]
+    for number, at in probes.items():
+        statement = nodes[at]
         while not isinstance(statement, ast.stmt):
             statement = parents[statement]
         call = ast.copy_location(ast.parse(f"{PROBE}({number})").body[0], statement)
         for block in vars(parents[statement]).values():
             if isinstance(block, list) and statement in block:
                 block.insert(block.index(statement), call)
-    return tree
+    for at in faults:
+        found = fault(nodes[at])
+        vars(nodes[at]).update(found[1] if found else {})
+    return ast.fix_missing_locations(tree)
 
 
-@cache
-def running() -> dict[tuple[str, str, int], list[FunctionType]]:
-    """Return the functions that exist, by file, qualified name and first line."""
-    found = defaultdict(list)
-    for each in gc.get_objects():
-        if type(each) is FunctionType:
-            code = each.__code__
-            found[code.co_filename, code.co_qualname, code.co_firstlineno].append(each)
-    return found
+class Watch:
+    """The pytest plugin of a process that runs tests: what each reached, and whether it passed."""
 
-
-def codes(code: CodeType) -> Iterator[CodeType]:
-    """Yield the code objects in a module's."""
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield each
-            yield from codes(each)
-
-
-def put(tree: ast.Module, path: str, names: set[str]) -> list[FunctionType]:
-    """Give functions the code of a changed module, by their names; return those that got it."""
-    whole, done = str(ROOT / path), []
-    module = compile(ast.fix_missing_locations(tree), whole, "exec", dont_inherit=True)
-    for code in codes(module):
-        for each in running().get((whole, code.co_qualname, code.co_firstlineno), ()):
-            if code.co_qualname in names and each.__code__.co_freevars == code.co_freevars:
-                each.__code__ = code
-                done.append(each)
-    return done
-
-
-class Loop:
-    """The pytest plugin that runs the tests in forked processes."""
-
-    def __init__(self, mutants: list[Mutant], at_once: int) -> None:
-        self.mutants = dict(enumerate(mutants))
-        self.at_once = at_once
-        self.failed = False
-        self.results: list[dict[str, Any]] = []
-        self.items: list[pytest.Item] = []
+    def __init__(self) -> None:
+        self.seen: set[int] = set()
+        self.has_failed = False
+        self.results: list[tuple[str, float, bool, list[int]]] = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note a failure."""
-        self.failed |= report.failed
+        self.has_failed |= report.failed
 
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Record what the tests reach, then try each mutant."""
-        gc.unfreeze()  # what is frozen is not found
-        gc.collect()
-        running()
-        gc.freeze()  # what is collected would copy pages
-        self.items, began = session.items, time.monotonic()
-        by_file: dict[Path, list[int]] = defaultdict(list)
-        for index, item in enumerate(self.items):
-            by_file[item.path].append(index)
-        files = sorted(by_file.values(), key=len, reverse=True)
-        done = self.forked([partial(self.reach, each) for each in files])
-        reached = [one for found in done for one in found or ()]
-        print(f"{len(reached)} tests in {time.monotonic() - began:.0f} s", flush=True)
-        reaching: dict[int, list[tuple[float, int]]] = {number: [] for number in self.mutants}
-        for index, seconds, passed, numbers in reached:
-            if not passed:
-                print(f"fails without a mutant: {self.items[index].nodeid}", flush=True)
-            for number in numbers if passed else ():
-                reaching[number].append((seconds, index))
-        jobs = [partial(self.attempt, each, sorted(tests)) for each, tests in reaching.items()]
-        for number, found in enumerate(self.forked(jobs)):  # in vain: it died, of whatever
-            lost = {"number": number, "killed by": None, "unmeasured": True}
-            self.results.append(found or lost)
-        return True
-
-    def reach(self, indices: list[int]) -> list[Any]:
-        """Run the tests of a file; return for each its time, its success, and what it reached."""
-        seen: set[int] = set()
-        for path in {mutant.path for mutant in self.mutants.values()}:
-            here = {number: it for number, it in self.mutants.items() if it.path == path}
-            for each in put(probed(path, here), path, {it.function for it in here.values()}):
-                each.__globals__[PROBE] = seen.add
-        found = []
-        for index in indices:
-            seen.clear()
-            began = time.monotonic()
-            passed = self.run(index)
-            found.append((index, time.monotonic() - began, passed, sorted(seen)))
-        return found
-
-    def attempt(self, number: int, tests: list[tuple[float, int]]) -> dict[str, Any]:
-        """Run the tests that reach a mutant until one fails."""
-        mutant = self.mutants[number]
-        what = {"number": number, **asdict(mutant), "reached by": len(tests), "killed by": None}
-        if not put(mutated(mutant), mutant.path, {mutant.function}):
-            return {**what, "unmeasured": True}
-        end = time.process_time() + BUDGET
-        for _, index in tests:
-            if time.process_time() > end:
-                return {**what, "budget": True}
-            if not self.run(index):
-                return {**what, "killed by": self.items[index].nodeid}
-        return what
-
-    def run(self, index: int) -> bool:
-        """Run one test; return whether it passed."""
-        self.failed = False
-        item = self.items[index]
-        item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
-        return not self.failed
-
-    def forked(self, jobs: list[Callable[[], Any]]) -> list[Any]:
-        """Do each job in a process of its own, so many at once; return results, None if lost."""
-        results: list[Any] = [None] * len(jobs)
-        under_way: dict[int, tuple[int, Path]] = {}
-        todo = list(enumerate(jobs))
-        with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-            while todo or under_way:
-                while todo and len(under_way) < self.at_once:
-                    number, job = todo.pop(0)
-                    file = Path(folder, f"{number}.json")
-                    if not (pid := os.fork()):
-                        self.child(job, file)
-                    under_way[pid] = number, file
-                pid, _ = os.wait()
-                number, file = under_way.pop(pid, (0, Path("/nowhere")))
-                if file.exists():
-                    results[number] = json.loads(file.read_text(encoding="utf-8"))
-                    if isinstance(results[number], dict):
-                        print(json.dumps(results[number]), flush=True)
-        return results
-
-    def child(self, job: Callable[[], Any], file: Path) -> None:
-        """Do a job in silence, with temporary files of its own, and end."""
-        nothing = os.open(os.devnull, os.O_RDWR)
-        os.dup2(nothing, 1)
-        os.dup2(nothing, 2)
-        try:
-            with tempfile.TemporaryDirectory() as folder:
-                factory: Any = self.items[0].config
-                factory = factory._tmp_path_factory
-                factory._basetemp, factory._given_basetemp = None, Path(folder, "base")
-                file.write_text(json.dumps(job()), encoding="utf-8")
-        finally:
-            os._exit(0)  # whatever was raised: what the parent has to clean up is not the child's
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """Note the time of a test and what it reaches, not what its module's import reached."""
+        self.seen.clear()
+        self.has_failed = False
+        began = time.monotonic()
+        done = yield
+        seconds = time.monotonic() - began
+        self.results.append((item.nodeid, seconds, not self.has_failed, sorted(self.seen)))
+        if time.process_time() > BUDGET and item.config.option.maxfail:
+            item.session.shouldstop = "budget"
+        return done
 
 
-def main() -> int:
-    """Run the command line; return the exit code."""
+def inside(job: Path) -> None:
+    """Run the tests of a job with its changed modules; write the results beside it."""
+    tests, changes = json.loads(job.read_text(encoding="utf-8"))
+    trees = {str(ROOT / path): changed(path, *how) for path, how in changes.items()}
+    get_code, watch = SourceFileLoader.get_code, Watch()
+    vars(builtins)[PROBE] = watch.seen.add
+
+    def code(loader: SourceFileLoader, name: str) -> Any:
+        if loader.path in trees:
+            return compile(trees[loader.path], loader.path, "exec", dont_inherit=True)
+        return get_code(loader, name)
+
+    SourceFileLoader.get_code = code  # type: ignore[method-assign, assignment]
+    sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
+    options = ["-q", "-p", "no:cacheprovider", "-n0", "-p", "no:randomly", "-o", "timeout=600"]
+    options += ["-x"] if any(faults for faults, _ in changes.values()) else []
+    status = pytest.main([*tests, *options], plugins=[watch])
+    if status == pytest.ExitCode.INTERRUPTED and not watch.results:  # of its import
+        watch.results.append(("collection", 0.0, False, []))
+    job.with_suffix(".out").write_text(json.dumps(watch.results), encoding="utf-8")
+
+
+def run(tests: list[str], changes: dict[str, Any]) -> Any:
+    """Run tests in a process of their own; return the results, None if it died."""
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        job = Path(folder, "job")
+        job.write_text(json.dumps((tests, changes)), encoding="utf-8")
+        command = [sys.executable, __file__, "--inside", str(job)]
+        subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
+        out = job.with_suffix(".out")
+        return json.loads(out.read_text(encoding="utf-8")) if out.exists() else None
+
+
+def reached(mutants: list[Mutant], paths: list[str], jobs: int) -> list[list[tuple[float, str]]]:
+    """Return for each mutant the tests that pass and reach it, the quickest first."""
+    probes: dict[str, Any] = defaultdict(lambda: ([], {}))
+    for number, mutant in enumerate(mutants):
+        probes[mutant.path][1][number] = mutant.node
+    files = [str(file) for path in map(Path, paths) for file in path.rglob("test_*.py")]
+    kept = [each for each in files if not each.startswith(tuple(f"tests/{it}" for it in LEFT_OUT))]
+    kept += [path for path in paths if not Path(path).is_dir()]
+    found: list[list[tuple[float, str]]] = [[] for _ in mutants]
+    began, count = time.monotonic(), 0
+    with ThreadPoolExecutor(jobs) as pool:
+        for results in pool.map(lambda file: run([file], probes), kept):
+            for test, seconds, passed, numbers in results or ():
+                count += 1
+                for number in numbers if passed else ():
+                    found[number].append((seconds, test))
+                if not passed:
+                    print(f"fails without a mutant: {test}", flush=True)
+    print(f"{count} tests in {time.monotonic() - began:.0f} s", flush=True)
+    return [sorted(each) for each in found]
+
+
+def attempt(mutant: Mutant, tests: list[tuple[float, str]]) -> dict[str, Any]:
+    """Run the tests that reach a mutant until one fails."""
+    what = {**asdict(mutant), "reached by": len(tests), "killed by": None}
+    results = run([test for _, test in tests], {mutant.path: ([mutant.node], {})}) if tests else []
+    if results is None:
+        return {**what, "unmeasured": True}
+    return {**what, "killed by": next((test for test, _, passed, _ in results if not passed), None)}
+
+
+def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         prog="tools/mutants.py",
         description=__doc__,
@@ -314,35 +254,36 @@ def main() -> int:
     parser.add_argument("--mutants", type=Path, metavar="FILE")
     parser.add_argument("--show", type=int, metavar="N")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--inside", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.inside:
+        return inside(options.inside)
     again = options.mutants
     mutants = survivors(again) if again else sample(options.count, options.seed)
     if options.show is not None:
         mutant = mutants[options.show]
         lines = (ROOT / mutant.path).read_text(encoding="utf-8").splitlines()
-        print(mutant, lines[mutant.line - 1], sep="\n")
-        return 0
-    loop = Loop(mutants, options.jobs)
+        return print(mutant, lines[mutant.line - 1], sep="\n")
     os.chdir(ROOT)
-    sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
-    arguments = ["-q", "--capture=sys", "-p", "no:cacheprovider", "-n", "0", "-p", "no:randomly"]
-    arguments += ["-o", "timeout=600", *(f"--ignore=tests/{each}" for each in LEFT_OUT)]
-    status = pytest.main([*options.only, *arguments], plugins=[loop])
-    if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) or not loop.results:
-        return 2
-    measured = [each for each in loop.results if not each.get("unmeasured")]
+    tests = reached(mutants, options.only, options.jobs)
+    with ThreadPoolExecutor(options.jobs) as pool:
+        results = []
+        for number, found in enumerate(pool.map(attempt, mutants, tests)):
+            results.append({"number": number, **found})
+            print(json.dumps(results[-1]), flush=True)
+    measured = [each for each in results if "unmeasured" not in each]
     alive = [each for each in measured if not each["killed by"]]
     never = [each for each in alive if not each["reached by"]]
     print(
-        f"{len(measured) - len(alive)} of {len(measured)} killed by {len(loop.items)} tests;"
-        f" {len(never)} not reached; {len(mutants) - len(measured)} not measured"
+        f"{len(measured) - len(alive)} of {len(measured)} killed; {len(never)} not reached;"
+        f" {len(mutants) - len(measured)} not measured"
     )
     for each in alive:
         print(f"survives: {each['path']}:{each['line']} {each['function']}: {each['what']}")
     if options.out:
-        options.out.write_text(json.dumps(loop.results, indent=1))
-    return 0
+        options.out.write_text(json.dumps(results, indent=1), encoding="utf-8")
+    return None
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

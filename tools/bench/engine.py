@@ -2,9 +2,13 @@
 
 import gc
 import json
+import subprocess
+import sys
 import tracemalloc
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import repeat
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -25,12 +29,12 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
 from rover_sim.body import Pose
 from rover_sim.bullet import PHYSICS_RATE, BulletBody
-from rover_sim.errors import MissingExtra
 from rover_sim.motion import CONTROL_PERIOD
-from rover_sim.vehicle import Vehicle, make_vehicle
+from rover_sim.vehicle import make_vehicle
 
-from .processes import BUILD, process
+from .processes import BUILD, environment
 from .rows import Row
+from .speed import timed
 from .wire import STATION
 
 CHILD = str(Path(__file__).with_name("engine_child.py"))
@@ -41,8 +45,19 @@ FEW, MANY = 1_000, 100_000  # waiting tasks
 SAMPLE = 2_000  # tasks submitted and taken while the others wait
 SETTINGS = replace(Settings(), queueing=Queueing(capacity=10 * MANY, quota=10 * MANY))
 SUBMITTER = Submitter("link", "127.0.0.1:50000", 255, 190)
-SIMULATED, WARM_UP = 30.0, 5.0  # s
-SETPOINT_PERIOD = 0.05  # s
+SIMULATED = 30.0  # s
+STEPS = round(SIMULATED * PHYSICS_RATE)
+SETPOINT = m.SetPositionTargetLocalNed(0, 1, 1, 8, 0x05C7, 0, 0, 0, 0.5, 0, 0, 0, 0, 0, 0, 0.3)
+#: a driver's commands, by their time
+TAKING = {
+    at: m.CommandLong(1, 1, number, 0, first, second, 0, 0, 0, 0, 0)
+    for at, number, first, second in (
+        (1.05, MavCmd.SET_MESSAGE_INTERVAL, m.LocalPositionNed.id, 5e4),
+        (1.1, MavCmd.SET_MESSAGE_INTERVAL, m.Attitude.id, 5e4),
+        (5.05, MavCmd.DO_SET_MODE, 1, 15),
+        (5.1, MavCmd.COMPONENT_ARM_DISARM, 1, 0),
+    )
+}
 
 
 def turns(tree: Path) -> Iterator[Row]:
@@ -50,7 +65,6 @@ def turns(tree: Path) -> Iterator[Row]:
     for at_once, goal in CALLS.items():
         what = f"Python calls of one command, {at_once} waiting"
         yield Row(what, _asked(tree, "calls", at_once), goal=f"≤ {goal}")
-    yield Row("C calls of one command, 1 waiting", _asked(tree, "c_calls"))
     idle = _asked(tree, "idle")
     yield Row("Python calls of an idle wake-up, median", median(idle), goal="≤ 40")
     yield Row("Python calls of an idle wake-up, most in 10 s", max(idle), goal="≤ 40")
@@ -61,14 +75,14 @@ def strangers(tree: Path) -> Iterator[Row]:
     """Memory and processor time that clients without rights cost, by endpoints × addresses."""
     for case in STRANGERS:
         what = f"strangers, {case[0]} × {case[1]} addresses, {case[2]} packets each"
-        goal = f"≤ {64 * case[0]} kB"
-        yield Row(f"{what}: memory", _asked(tree, "bytes", *case), "kB", goal=goal)
-        yield Row(f"{what}: processor, each", _asked(tree, "seconds", *case), "µs")
+        memory, seconds = _asked(tree, "strangers", *case)
+        yield Row(f"{what}: memory", memory, "kB", goal=f"≤ {64 * case[0]} kB")
+        yield Row(f"{what}: processor, each", seconds, "µs")
 
 
 def _asked(tree: Path, *words: object) -> Any:
-    with process("-P", CHILD, *map(str, words), tree=tree) as it:
-        return json.loads(it.wait_for(r"^[\d\[].*\n"))
+    command = [sys.executable, "-P", CHILD, *map(str, words)]
+    return json.loads(subprocess.check_output(command, env=environment(tree)))
 
 
 def queue(_tree: Path) -> Iterator[Row]:
@@ -130,61 +144,27 @@ def _submitted(count: int) -> float:
 
 
 def simulation(_tree: Path) -> Iterator[Row]:
-    """A pybullet rover with MAVLink on a circle, real time a second; beside bare stepping."""
-    try:
-        body = BulletBody(start=Pose())
-    except MissingExtra as missing:
-        raise ValueError(missing) from missing
+    """A pybullet rover with MAVLink on a circle, seconds a second; beside bare stepping."""
     import pybullet  # noqa: PLC0415  # optional
 
+    body = BulletBody(start=Pose())
     body.drive(0.5, 0.3)
     body.advance(1 / PHYSICS_RATE)  # sets one physics step per call
-    for steps in (round(WARM_UP * PHYSICS_RATE), round(SIMULATED * PHYSICS_RATE)):
-        begin = perf_counter()
-        for _ in range(steps):
-            pybullet.stepSimulation(body._client)
-    plain = SIMULATED / (perf_counter() - begin)
+    plain = timed(lambda: deque(map(pybullet.stepSimulation, repeat(body._client, STEPS)), 0))
     body.close()
-    body = BulletBody(start=Pose())
-    vehicle = make_vehicle(body, system_id=1, now=0.0)
-    now = _driven(vehicle, 0.0)
-    before = vehicle.truth
-    begin = perf_counter()
-    _driven(vehicle, now, SIMULATED)
-    ours = SIMULATED / (perf_counter() - begin)
-    assert vehicle.truth.north != before.north, "the rover did not move"
-    body.close()
-    yield Row("simulated rover with MAVLink", ours, "s/s", plain, "stepSimulation", "≥ 0.6×")
-
-
-def _driven(vehicle: Vehicle, now: float, seconds: float = 0.0) -> float:
-    """Stream setpoints to a rover; without ``seconds``, first take it. Return the time."""
+    vehicle = make_vehicle(BulletBody(start=Pose()), system_id=1, now=0.0)
     encode = Encoder(Address(250, 191)).encode
 
-    def send(*messages: m.Message) -> None:
-        for message in messages:
-            vehicle.receive(encode(message), "driver", now=now)
-
-    def run(seconds: float) -> None:
-        nonlocal now
-        for step in range(round(seconds / CONTROL_PERIOD)):
-            now += CONTROL_PERIOD
-            if step % round(SETPOINT_PERIOD / CONTROL_PERIOD) == 0:
-                velocity = 0, 0, 0, 0.5, 0, 0, 0, 0, 0, 0, 0.3  # m/s and rad/s, BODY_NED
-                send(m.SetPositionTargetLocalNed(0, 1, 1, 8, 0x05C7, *velocity))
-            if step % round(1 / CONTROL_PERIOD) == 0:
-                send(STATION)
+    def run() -> None:
+        for step in range(round(SIMULATED / CONTROL_PERIOD)):
+            now = step * CONTROL_PERIOD
+            if step % round(0.05 / CONTROL_PERIOD) == 0:
+                beat = STATION if step % round(1 / CONTROL_PERIOD) == 0 else SETPOINT
+                vehicle.receive(encode(TAKING.get(round(now, 2), beat)), "driver", now=now)
             vehicle.handle_deadline(now=now)
             vehicle.take_packets()
 
-    def command(number: int, *params: float) -> m.CommandLong:
-        return m.CommandLong(1, 1, number, 0, *(*params, *(0.0,) * 7)[:7])
-
-    if not seconds:
-        send(STATION)
-        for wanted in (m.LocalPositionNed.id, m.Attitude.id):
-            send(command(MavCmd.SET_MESSAGE_INTERVAL, wanted, 1e6 * SETPOINT_PERIOD))
-        run(WARM_UP)
-        send(command(MavCmd.DO_SET_MODE, 1, 15), command(MavCmd.COMPONENT_ARM_DISARM, 1))
-    run(seconds or WARM_UP)
-    return now
+    ours = SIMULATED / timed(run)
+    assert abs(vehicle.truth.north) > 0.1, "the rover did not move"
+    what = "simulated rover with MAVLink"
+    yield Row(what, ours, "s/s", SIMULATED / plain, "stepSimulation", "≥ 0.6×")

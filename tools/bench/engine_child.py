@@ -6,25 +6,23 @@ It imports nothing of this package: ``PYTHONPATH=TREE python -P tools/bench/engi
 work on commands that wait together, 1 by default: ``handle(Packets)``, ``take_packets``,
 ``take_events``, then ``handle(Committed)`` and both again. The rover is armed and in HOLD, one task
 is starting (the rover does not follow the mode request yet), and ten wait: a submission is only
-queued, and answered by COMMAND_ACK, STATUSTEXT and TASK_STATUS. ``c_calls`` counts those of C
-functions, ``names`` Python's by name, ``cpu`` gives the processor seconds of a turn.
+queued, and answered by COMMAND_ACK, STATUSTEXT and TASK_STATUS. ``cpu`` gives the processor seconds
+of a turn.
 
 ``idle`` counts the calls of each idle wake-up of 10 s: ``handle_deadline``, ``take_packets``,
 ``take_events`` and ``next_deadline``, with one rover that stands disarmed in HOLD.
 
-``bytes ENDPOINTS ADDRESSES PACKETS`` is the memory that strangers cost, ``seconds`` the processor
-time of one of their packets. Each address at each endpoint sends so many commands, no two alike,
-within the rate of its role, observer: "continue", which it may not send, and requests.
+``strangers ENDPOINTS ADDRESSES PACKETS`` gives the bytes that they cost, and the processor seconds
+of one of their packets. Each address at each endpoint sends so many commands, no two alike, within
+the rate of its role, observer: "continue", which it may not send, and requests.
 """
 
 import gc
 import json
 import sys
 import tracemalloc
-from collections import Counter
 from collections.abc import Callable
 from time import process_time_ns
-from types import FrameType
 from typing import Any
 
 from mav_tasks.config.settings import Clients, Limits, Queueing, Roles, Settings
@@ -56,29 +54,23 @@ TURNS, ROUNDS = 100, 20  # turns with one engine; more would outlast the startin
 STRANGERS_APART = 0.01  # s between two packets from one endpoint
 
 
-class Calls(Counter[str]):
-    """Calls of Python functions by name, or of C functions, while it is entered.
+class Calls:
+    """Counts the calls of Python functions while it is entered.
 
     A comprehension is a function up to Python 3.11, and each step of a generator is a call.
     """
 
-    def __init__(self, kind: str = "call") -> None:
-        super().__init__()
-        self._kind = kind
+    count = 0
 
     def __enter__(self) -> None:
         sys.setprofile(self._note)
 
     def __exit__(self, *_: object) -> None:
         sys.setprofile(None)
-        own = "engine_child.py:Calls.__exit__" if self._kind == "call" else "setprofile"
-        self.subtract([own])
+        self.count -= 1  # this one
 
-    def _note(self, frame: FrameType, event: str, what: Any) -> None:
-        if event == self._kind:
-            code = frame.f_code
-            file = code.co_filename.rpartition("mav_tasks/")[2].rpartition("/tools/bench/")[2]
-            self[what.__qualname__ if event == "c_call" else f"{file}:{code.co_qualname}"] += 1
+    def _note(self, _frame: object, event: str, _what: object) -> None:
+        self.count += event == "call"
 
 
 class Clock:
@@ -194,14 +186,14 @@ def with_queue() -> World:
     return world
 
 
-def counted(at_once: int, kind: str = "call") -> Calls:
-    """Return the calls of one turn; the first turns only warm up the engine."""
+def calls(at_once: int = 1) -> float:
+    """Return the calls of one turn for each command; the first turns only warm up the engine."""
     world = with_queue()
     for _ in range(3):
         world.run(3 * APART)
-        calls = Calls(kind)
-        world.turn(world.moves(at_once), calls)
-    return calls
+        counted = Calls()
+        world.turn(world.moves(at_once), counted)
+    return counted.count / at_once
 
 
 def idle() -> list[int]:
@@ -215,7 +207,7 @@ def idle() -> list[int]:
         return found[-1]
 
     world.run(10.0, another)
-    return [each.total() for each in found]
+    return [each.count for each in found]
 
 
 def cpu() -> float:
@@ -230,10 +222,8 @@ def cpu() -> float:
     return clock.spent / (ROUNDS * TURNS) / 1e9
 
 
-def strangers(what: str, endpoints: int, addresses: int, packets: int) -> float:
-    """Return what strangers cost."""
-    if what == "bytes":
-        tracemalloc.start()
+def cost(endpoints: int, addresses: int, packets: int) -> tuple[int, float]:
+    """Return the bytes that strangers cost, and the processor seconds of one of their packets."""
     world, clock, before = World(OBSERVED), Clock(), 0
     peers = [
         (("10.0.0.1", port), Encoder(Address(1 + number, 190)).encode)
@@ -256,8 +246,17 @@ def strangers(what: str, endpoints: int, addresses: int, packets: int) -> float:
                 world.engine.handle(item, now=world.now)
             world.drain()
         if turn < 0:
-            before, clock.spent = allocated(), 0
-    return allocated() - before if what == "bytes" else clock.spent / packets / len(peers) / 1e9
+            clock.spent = 0
+            before = allocated()
+    return allocated() - before, clock.spent / packets / len(peers) / 1e9
+
+
+def strangers(*case: int) -> tuple[int, float]:
+    """Return what strangers cost; memory by itself, as tracing it takes time."""
+    tracemalloc.start()
+    memory, _ = cost(*case)
+    tracemalloc.stop()
+    return memory, cost(*case)[1]
 
 
 def allocated() -> int:
@@ -266,23 +265,7 @@ def allocated() -> int:
     return tracemalloc.get_traced_memory()[0]
 
 
-def main(what: str, *numbers: str) -> Any:
-    """Return what is asked for."""
-    match what:
-        case "calls":
-            at_once = int(*numbers or "1")
-            return counted(at_once).total() / at_once
-        case "c_calls":
-            return counted(1, "c_call").total()
-        case "names":
-            return dict(counted(1).most_common())
-        case "idle":
-            return idle()
-        case "cpu":
-            return cpu()
-        case _:
-            return strangers(what, *map(int, numbers))
-
+WHAT = {"calls": calls, "idle": idle, "cpu": cpu, "strangers": strangers}
 
 if __name__ == "__main__":
-    print(json.dumps(main(*sys.argv[1:])))
+    print(json.dumps(WHAT[sys.argv[1]](*map(int, sys.argv[2:]))))  # type: ignore[operator]

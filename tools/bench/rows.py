@@ -40,30 +40,19 @@ class Row:
     goal: str = ""
     note: str = ""
 
-    @property
-    def ratio(self) -> float | None:
-        """The figure in yardsticks."""
-        return self.figure / self.beside if self.beside else None
-
-    @property
-    def is_met(self) -> bool | None:
-        """Whether the goal is met; None without a goal."""
-        if not self.goal:
-            return None
-        sign, number, *_ = self.goal.replace(",", "").split()
-        scaled = self.figure * SCALES.get(self.unit, 1.0)
-        found = self.ratio if number.endswith("×") else scaled
-        if found is None:
-            return None
-        limit = float(number.rstrip("×"))
-        return found >= limit if sign == "≥" else found <= limit
-
     def cells(self) -> tuple[str, ...]:
         """Return the cells of its line."""
+        ratio = self.figure / self.beside if self.beside else None
         beside = "" if self.beside is None else f"{shown(self.beside, self.unit)} {self.of}"
-        ratio = "" if self.ratio is None else f"{self.ratio:.2f}×"
-        met = {True: "yes", False: "NO", None: ""}[self.is_met]
-        return self.what, shown(self.figure, self.unit), beside, ratio, self.goal, met, self.note
+        met = ""
+        if self.goal:
+            sign, number, *_ = self.goal.replace(",", "").replace("×", " ×").split()
+            scaled = self.figure * SCALES.get(self.unit, 1.0)
+            found = ratio if ratio and "×" in self.goal else scaled
+            met = "yes" if (found >= float(number)) == (sign == "≥") else "NO"
+        shown_ratio = "" if ratio is None else f"{ratio:.2f}×"
+        figure = shown(self.figure, self.unit)
+        return self.what, figure, beside, shown_ratio, self.goal, met, self.note
 
 
 def shown(value: float, unit: str) -> str:

@@ -87,7 +87,7 @@ def durable(tree: Path) -> Iterator[Row]:
             file.write(PAGE)
             os.fsync(file)
 
-        sync = percentiles([_timed(write) for _ in range(500)])
+        sync = percentiles([timed(write) for _ in range(500)])
     with introduced(tree, "--store=tasks.sqlite3") as (_, client, rover):
         ours, acks = _acknowledged(client, rover)
     both = Percentiles(*(a + b for a, b in zip(echo[0], sync, strict=True)))
@@ -102,7 +102,7 @@ def postgres(tree: Path) -> Iterator[Row]:
         plain.execute("CREATE TABLE public.plain (id BIGSERIAL, body TEXT)")
 
         def insert() -> None:
-            inserts.append(_timed(lambda: plain.execute(INSERT, (BODY,))))
+            inserts.append(timed(lambda: plain.execute(INSERT, (BODY,))))
 
         with introduced(tree, f"--store={it.new_database()}") as (_, client, rover):
             ours, acks = _acknowledged(client, rover, between=insert, count=2_000)
@@ -251,7 +251,7 @@ def start(tree: Path) -> Iterator[Row]:
         run = partial(
             subprocess.run, command, check=True, stdout=subprocess.DEVNULL, env=environment(tree)
         )
-        return median([_timed(run) for _ in range(STARTS + 1)][1:])  # the first fills the cache
+        return median([timed(run) for _ in range(STARTS + 1)][1:])  # the first fills the cache
 
     python = ran("-c", "pass")
     dialect, library = ran("-c", "import mav_tasks.mavlink._dialect"), ran("-c", LIBRARY)
@@ -284,7 +284,8 @@ def _first_heartbeat(tree: Path) -> float:
     return median(times)
 
 
-def _timed(do: Callable[[], object]) -> float:
+def timed(do: Callable[[], object]) -> float:
+    """Return the seconds of a call."""
     begin = perf_counter()
     do()
     return perf_counter() - begin
