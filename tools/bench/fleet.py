@@ -1,11 +1,8 @@
-"""Gateways of a fleet on PostgreSQL: evenness of setpoints, and the datagrams between them."""
+"""The datagrams that gateways of a fleet send each other through PostgreSQL."""
 
-import math
 import struct
-import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
 from itertools import cycle
 from pathlib import Path
 from select import select
@@ -18,14 +15,10 @@ from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import parse
 from mav_tasks.store.postgres.session import Session
 
-from .driving import drive
-from .processes import cpu_seconds, database, server, simulated_rovers
+from .processes import cpu_seconds, database
 from .rows import Row, percentiles
 from .speed import timed
 
-#: number of gateways, and rovers of each; 0 gateways: a server without a fleet
-SETS = ((0, 20), (1, 20), (0, 100), (1, 100), (4, 25))
-DRIVING = 10.0  # s
 SECONDS = 5.0  # of datagrams
 RATE = 500  # packets/s from each gateway to each other one
 FLOOD = 15_000  # packets/s; more than it carries
@@ -34,52 +27,7 @@ STOP_EVERY = 0.05  # s
 AFTER = 0.3  # s in which the last ones arrive
 
 
-def gateways(tree: Path) -> Iterator[Row]:
-    """Setpoints of 20 to 100 rovers of gateways; beside a server without a fleet."""
-    alone: dict[int, float] = {}
-    for number, each in SETS:
-        worst, longest, cpu, of_database = _driven(tree, number, each)
-        note = f"longest {longest * 1e3:.0f} ms, {cpu:.2f} cores each, database {of_database:.2f}"
-        if not number:
-            alone[each] = worst
-        what = f"{number} gateways" if number else "a server without a fleet"
-        what += f", {each} rovers each: setpoint error, worst p99 of a rover"
-        beside = alone[max(1, number) * each] if number else None
-        yield Row(what, worst, "ms", beside, "without a fleet", "≤ 5 ms" if number else "", note)
-
-
-def _driven(tree: Path, number: int, each: int) -> tuple[float, float, float, float]:
-    """Return the worst p99 of a rover, the longest interval, and cores of gateway and database."""
-    with ExitStack() as stack:
-        base = stack.enter_context(database()) if number else None
-        store = f"--store={base.new_database() if base else ':memory:'}"
-        servers = []
-        for index in range(max(1, number)):
-            first = 1 + index * each
-            rovers = stack.enter_context(simulated_rovers(each, first=first))
-            options = ["--arming=server", store, *([f"--gateway=g{index}"] if number else [])]
-            it = stack.enter_context(server(tree, rovers, *options, is_timed=True))
-            servers.append((first, it))
-        for first, it in servers:
-            drive(it, each, first=first)
-        pids = base.pids() if base else []
-        before = sum(it.seconds() for _, it in servers), cpu_seconds(*pids)
-        begin = time.monotonic()
-        time.sleep(DRIVING)
-        end = time.monotonic()
-        after = sum(it.seconds() for _, it in servers), cpu_seconds(*pids)
-    errors: dict[float, list[float]] = {}
-    for _, it in servers:
-        for rover, at, error in it.results():
-            if begin <= at < end:
-                errors.setdefault(rover, []).append(error)
-    cores, of_database = ((b - a) / DRIVING for a, b in zip(before, after, strict=True))
-    worst = max((percentiles(found).p99 for found in errors.values()), default=math.inf)
-    longest = 0.05 + max(map(max, errors.values()), default=math.inf)
-    return worst, longest, cores / len(servers), of_database
-
-
-def carrier(_tree: Path) -> Iterator[Row]:
+def measure(_tree: Path) -> Iterator[Row]:
     """STOPs and packets between gateways; beside a round trip of one gateway to its database."""
     with database() as base:
         for number, rate in ((2, 0), (2, RATE), (4, RATE), (2, FLOOD)):
@@ -110,7 +58,7 @@ def mail(url: str, name: str, names: list[str], rate: float) -> tuple[float, flo
     found: tuple[list[float], list[float]] = [], []
 
     def receive(within: float) -> None:
-        select([carrier.fileno()], [], [], max(0.0, within))
+        select([carrier.fileno() or 0], [], [], max(0.0, within))
         now = boot_time()
         for each in carrier.take():
             assert isinstance(each, Arrived), each

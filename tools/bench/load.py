@@ -5,7 +5,6 @@ HTTP, each time on a connection of its own.
 """
 
 import http.client
-import json
 import math
 import os
 import re
@@ -17,8 +16,8 @@ import sys
 import time
 import tty
 import urllib.request
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -41,7 +40,6 @@ APART = 0.1  # s between STOPs by MAVLink, each of another address
 APART_HTTP = 0.7  # s; one client's STOPs that are closer wait, so that they are no copies
 PATIENCE = 2.0  # s without an acknowledgement: lost
 SECRET = b"an operator's key of 32 bytes: ."
-VERSION = "2026-07-28"  # of MCP, without sessions
 ACKNOWLEDGED = re.compile(rb"\xfd.{6}\x4d\0\0" + STOP.command.to_bytes(2, "little"), re.DOTALL)
 LARGE = b'{"text": "x", "more": [' + b'{"a":1},' * 280_000 + b"1]}"
 TASK = b'{"goals": [{"kind": "wait", "duration": 1}], "delay": 5000}'
@@ -49,20 +47,16 @@ SESSION = (
     b'{"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"protocolVersion":'
     b' "2025-11-25", "capabilities": {}, "clientInfo": {"name": "a", "version": "1"}}}'
 )
-META = {
-    "io.modelcontextprotocol/protocolVersion": VERSION,
-    "io.modelcontextprotocol/clientInfo": {"name": "a", "version": "1"},
-    "io.modelcontextprotocol/clientCapabilities": {},
-}
-CALL = {
-    "jsonrpc": "2.0",
-    "id": 1,
-    "method": "tools/call",
-    "params": {"name": "stop", "arguments": {}, "_meta": META},
-}
+CALL = (
+    b'{"jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": {"name": "stop", "arguments":'
+    b' {}, "_meta": {"io.modelcontextprotocol/protocolVersion": "2026-07-28",'
+    b' "io.modelcontextprotocol/clientInfo": {"name": "a", "version": "1"},'
+    b' "io.modelcontextprotocol/clientCapabilities": {}}}}'
+)
+JSON = {"content-type": "application/json"}
 OF_CALL = {
     "accept": "application/json, text/event-stream",
-    "mcp-protocol-version": VERSION,
+    "mcp-protocol-version": "2026-07-28",  # without sessions
     "mcp-method": "tools/call",
     "mcp-name": "stop",
 }
@@ -158,7 +152,7 @@ def measure(tree: Path) -> Iterator[Row]:
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
     yield from _of_links(tree)
     for face, kinds, path, body, headers in (
-        ("web", PAGE, "/api/v1/stop", {}, {}),
+        ("web", PAGE, "/api/v1/stop", b"{}", {}),
         ("mcp", AGENTS, "/mcp", CALL, OF_CALL),
     ):
         with _server(tree) as it, faced(tree, face, it.port) as (own, port):
@@ -226,10 +220,11 @@ def _of_links(tree: Path) -> Iterator[Row]:
         yield from _loaded("serial line", {"noise": (noise,)}, it, by_udp, far)
         yield from _loaded("metrics", {**SILENT, **HALF}, it, by_udp, metrics)
         for name, port, secret in (("signed", closed, SECRET), ("unsigned", opened, b"")):
-            with socket.create_connection((HOST, port), PATIENCE) as known:
-                stop = partial(_stop_by_tcp, port, secret, known)
+            dial = partial(socket.create_connection, (HOST, port), PATIENCE)
+            with dial() as known:
+                stop = partial(_stop_by_tcp, partial(nullcontext[socket.socket], known), secret)
                 yield from _loaded(f"TCP link, {name}", LINK, it, stop, port)
-            new = partial(_stop_by_tcp, port, secret)
+            new = partial(_stop_by_tcp, dial, secret)
             yield from _loaded(f"TCP link, {name}, new client", LINK, it, new, port)
 
 
@@ -239,21 +234,12 @@ _STOPS = (
 )
 
 
-def _stop_by_tcp(port: int, secret: bytes, known: socket.socket | None = None) -> float:
+def _stop_by_tcp(dial: Callable[[], AbstractContextManager[socket.socket]], secret: bytes) -> float:
     """Return the seconds of a STOP until its acknowledgement comes; infinity if it does not."""
-    packet, came = next(_STOPS), b""
+    packet, came, begin = next(_STOPS), b"", time.perf_counter()
     if secret:
         packet = signed(packet, secret, link_id=1, timestamp=timestamp_at(time.time()))
-    with suppress(OSError), ExitStack() as stack:
-        if known:
-            known.settimeout(0.0)
-            with suppress(BlockingIOError):
-                while known.recv(65536):
-                    pass
-        begin = time.perf_counter()
-        connection = known or socket.create_connection((HOST, port), PATIENCE)
-        stack.callback(connection.close if known is None else bool)
-        connection.settimeout(PATIENCE)
+    with suppress(OSError), dial() as connection:
         connection.sendall(packet)
         while time.perf_counter() < begin + PATIENCE and (more := connection.recv(2048)):
             came = came[-300:] + more
@@ -270,17 +256,14 @@ def faced(tree: Path, face: str, server: int) -> Iterator[tuple[Process, int]]:
         yield it, int(it.wait_for(rf"(?:page:|use) http://{HOST}:(\d+)"))
 
 
-def asked(url: str, body: Any = None, headers: dict[str, str] | None = None) -> bytes:
+def asked(url: str, body: bytes | None = None, headers: Mapping[str, str] = JSON) -> bytes:
     """Return the answer to JSON, or to nothing."""
-    data = None if body is None else json.dumps(body).encode()
-    named = {"content-type": "application/json"} | (headers or {})
-    request = urllib.request.Request(url, data, named)
+    request = urllib.request.Request(url, body, {**JSON, **headers})
     with urllib.request.urlopen(request, timeout=15) as answer:
-        found: bytes = answer.read()
-    return found
+        return bytes(answer.read())
 
 
-def _stop_by_http(url: str, body: Any, headers: dict[str, str]) -> float:
+def _stop_by_http(url: str, body: bytes, headers: Mapping[str, str]) -> float:
     begin = time.perf_counter()
     with suppress(OSError, http.client.HTTPException):
         if re.search(b"acknowledged|STOP is in force", asked(url, body, headers)):

@@ -45,7 +45,8 @@ from .wire import (
     stops,
 )
 
-WARM_UP, ONE_BY_ONE, MANY = 1_000, 5_000, 50_000  # commands
+WARM_UP, ONE_BY_ONE, MANY = 500, 3_000, 40_000  # commands
+Acks = tuple[Percentiles, float]  # seconds of one, and answers a second
 ACK = m.CommandAck.id
 ZERO = m.SetPositionTargetLocalNed.id
 PAGE = b"x" * 4_096  # bytes of an fsync
@@ -72,15 +73,12 @@ LIBRARY = "from mav_tasks import Client, Move"
 def commands(tree: Path) -> Iterator[Row]:
     """COMMAND_LONG (TASK_MOVE) → COMMAND_ACK, store in memory; beside a bare echo."""
     echo = _echo()
-    with introduced(tree) as (_, client, rover):
-        ours, acks = _acknowledged(client, rover)
-    yield from latencies("command → ack", ours, echo[0], "echo", "≤ 1.6×")
-    yield Row(f"acks, {OUTSTANDING} outstanding", acks, "/s", echo[1], "echo", "≥ 0.65×")
+    yield from _rows("", _served(tree), echo, "echo", "≤ 1.6×", "≥ 0.65×")
 
 
 def durable(tree: Path) -> Iterator[Row]:
     """The same with the store on a disk; beside an echo and an fsync."""
-    echo = _echo()
+    times, acks = _echo()
     with TemporaryFile(dir=BUILD, buffering=0) as file:
 
         def write() -> None:
@@ -88,11 +86,9 @@ def durable(tree: Path) -> Iterator[Row]:
             os.fsync(file)
 
         sync = percentiles([timed(write) for _ in range(500)])
-    with introduced(tree, "--store=tasks.sqlite3") as (_, client, rover):
-        ours, acks = _acknowledged(client, rover)
-    both = Percentiles(*(a + b for a, b in zip(echo[0], sync, strict=True)))
-    yield from latencies("durable → ack", ours, both, "echo + fsync", "≤ 1.5×")
-    yield Row(f"durable acks, {OUTSTANDING} outstanding", acks, "/s", echo[1], "echo", "≥ 0.5×")
+    both = Percentiles(times.p50 + sync.p50, times.p99 + sync.p99)
+    ours = _served(tree, "--store=tasks.sqlite3")
+    yield from _rows(", on the disk", ours, (both, acks), "echo + fsync", "≤ 1.5×", "≥ 0.5×")
 
 
 def postgres(tree: Path) -> Iterator[Row]:
@@ -104,46 +100,45 @@ def postgres(tree: Path) -> Iterator[Row]:
         def insert() -> None:
             inserts.append(timed(lambda: plain.execute(INSERT, (BODY,))))
 
-        with introduced(tree, f"--store={it.new_database()}") as (_, client, rover):
-            ours, acks = _acknowledged(client, rover, between=insert, count=2_000)
+        ours = _served(tree, f"--store={it.new_database()}", between=insert)
     theirs = percentiles(inserts)
-    yield from latencies("on PostgreSQL → ack", ours, theirs, "INSERT", "≤ 1.3×")
-    of = "INSERTs, one by one"
-    what = f"acks on PostgreSQL, {OUTSTANDING} outstanding"
-    yield Row(what, acks, "/s", 1 / theirs.p50, of, "≥ 5,000 /s")
+    beside = theirs, 1 / theirs.p50
+    yield from _rows(", on PostgreSQL", ours, beside, "INSERT", "≤ 1.3×", "≥ 5,000 /s")
 
 
 def recorded(tree: Path) -> Iterator[Row]:
     """Commands to a server that writes a telemetry log, or a record; beside one that does not."""
-    with introduced(tree) as (_, client, rover):
-        plain, acks = _acknowledged(client, rover)
+    plain = _served(tree)
     for option in ("--tlog", "--record"):
-        with introduced(tree, f"{option}=recorded") as (_, client, rover):
-            ours, kept = _acknowledged(client, rover)
-        yield from latencies(f"command → ack, {option}", ours, plain, "without")
-        yield Row(f"acks, {OUTSTANDING} outstanding, {option}", kept, "/s", acks, "without")
+        yield from _rows(f", {option}", _served(tree, f"{option}=here"), plain, "without")
 
 
-def _echo() -> tuple[Percentiles, float]:
+def _rows(of: str, ours: Acks, beside: Acks, yardstick: str, *goals: str) -> Iterator[Row]:
+    time_goal, rate_goal = goals or ("", "")
+    yield from latencies(f"command → ack{of}", ours[0], beside[0], yardstick, time_goal)
+    what = f"acks, {OUTSTANDING} outstanding{of}"
+    yield Row(what, ours[1], "/s", beside[1], yardstick.partition(" ")[0], rate_goal)
+
+
+def _served(tree: Path, *options: str, between: Callable[[], None] = lambda: None) -> Acks:
+    with introduced(tree, *options) as (_, client, rover):
+        return _acknowledged(client, ACK, rover.live, between)
+
+
+def _echo() -> Acks:
     (port,) = free_udp_ports(1)
     with bare(port), Speaker(to=port) as client:
-        return _acknowledged(client, None, answer=m.CommandLong.id)
+        return _acknowledged(client, m.CommandLong.id, lambda: None, lambda: None)
 
 
 def _acknowledged(
-    client: Speaker,
-    rover: Rovers | None,
-    *,
-    answer: int = ACK,
-    between: Callable[[], None] = lambda: None,
-    count: int = ONE_BY_ONE,
-) -> tuple[Percentiles, float]:
+    client: Speaker, answer: int, live: Callable[[], None], between: Callable[[], None]
+) -> Acks:
     """Return the seconds of one command at a time, and answers/s with many under way."""
-    supply = (client.encode(move(nonce)) for nonce in range(1, WARM_UP + count + MANY + 1))
-    packed = iter(list(supply))
-    live = rover.live if rover else lambda: None
+    total = WARM_UP + ONE_BY_ONE + MANY
+    packed = iter([client.encode(move(nonce)) for nonce in range(1, total + 1)])
     times = []
-    for packet in islice(packed, WARM_UP + count):
+    for packet in islice(packed, WARM_UP + ONE_BY_ONE):
         live()
         between()
         times.append(effect(client, packet, answer, at=client))
