@@ -222,7 +222,7 @@ def _of_links(tree: Path) -> Iterator[Row]:
         for name, port, secret in (("signed", closed, SECRET), ("unsigned", opened, b"")):
             dial = partial(socket.create_connection, (HOST, port), PATIENCE)
             with dial() as known:
-                stop = partial(_stop_by_tcp, partial(nullcontext[socket.socket], known), secret)
+                stop = partial(_stop_by_tcp, partial(_same, known), secret)
                 yield from _loaded(f"TCP link, {name}", LINK, it, stop, port)
             new = partial(_stop_by_tcp, dial, secret)
             yield from _loaded(f"TCP link, {name}, new client", LINK, it, new, port)
@@ -232,6 +232,10 @@ def _of_links(tree: Path) -> Iterator[Row]:
 _STOPS = (
     Encoder(Address(200 + number % 40, 1 + number // 40 % 250)).encode(STOP) for number in count()
 )
+
+
+def _same(known: socket.socket) -> AbstractContextManager[socket.socket]:
+    return nullcontext(known)
 
 
 def _stop_by_tcp(dial: Callable[[], AbstractContextManager[socket.socket]], secret: bytes) -> float:
