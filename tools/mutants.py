@@ -24,10 +24,9 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, fields
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -46,8 +45,7 @@ SWAPS = {getattr(ast, a): getattr(ast, b) for a, b in map(str.split, PAIRS)}
 SWAPS |= {b: a for a, b in SWAPS.items()}
 
 
-@dataclass(frozen=True)
-class Mutant:
+class Mutant(NamedTuple):
     """A fault: the number of its node in a walk over its module, and what is done to that."""
 
     path: str
@@ -118,16 +116,14 @@ def sample(count: int, seed: int) -> list[Mutant]:
 
 def survivors(figures: Path) -> list[Mutant]:
     """Return the mutants that no test killed in an earlier run, unless the source has changed."""
-    names = [each.name for each in fields(Mutant)]
     found = [
-        Mutant(*(result[name] for name in names))
+        Mutant(*(result[name] for name in Mutant._fields))
         for result in json.loads(figures.read_text(encoding="utf-8"))
         if not result["killed by"] and not result.get("unmeasured")
     ]
     present = {each for path in {it.path for it in found} for each in mutants_of(path)}
-    for mutant in found:
-        if mutant not in present:
-            print(f"left out, its module has changed: {mutant}", flush=True)
+    for mutant in {*found} - present:
+        print(f"left out, its module has changed: {mutant}", flush=True)
     return [mutant for mutant in found if mutant in present]
 
 
@@ -193,9 +189,10 @@ def inside(job: Path) -> None:
     options = ["-q", "-p", "no:cacheprovider", "-n0", "-p", "no:randomly", "-o", "timeout=600"]
     options += ["-x"] if any(faults for faults, _ in changes.values()) else []
     status = pytest.main([*tests, *options], plugins=[watch])
-    if status == pytest.ExitCode.INTERRUPTED and not watch.results:  # of its import
+    if status == pytest.ExitCode.INTERRUPTED and not watch.results:  # the import fails
         watch.results.append(("collection", 0.0, False, []))
-    job.with_suffix(".out").write_text(json.dumps(watch.results), encoding="utf-8")
+    if status <= pytest.ExitCode.INTERRUPTED:
+        job.with_suffix(".out").write_text(json.dumps(watch.results), encoding="utf-8")
 
 
 def run(tests: list[str], changes: dict[str, Any]) -> Any:
@@ -233,7 +230,7 @@ def reached(mutants: list[Mutant], paths: list[str], jobs: int) -> list[list[tup
 
 def attempt(mutant: Mutant, tests: list[tuple[float, str]]) -> dict[str, Any]:
     """Run the tests that reach a mutant until one fails."""
-    what = {**asdict(mutant), "reached by": len(tests), "killed by": None}
+    what = {**mutant._asdict(), "reached by": len(tests), "killed by": None}
     results = run([test for _, test in tests], {mutant.path: ([mutant.node], {})}) if tests else []
     if results is None:
         return {**what, "unmeasured": True}
@@ -247,14 +244,11 @@ def main() -> None:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
+    for name, default in (("count", 200), ("seed", 1), ("jobs", 2), ("show", None)):
+        parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--only", nargs="*", default=["tests"], metavar="PATH")
-    parser.add_argument("--mutants", type=Path, metavar="FILE")
-    parser.add_argument("--show", type=int, metavar="N")
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--inside", type=Path, help=argparse.SUPPRESS)
+    for name in ("mutants", "out", "inside"):  # the last one is for this program itself
+        parser.add_argument(f"--{name}", type=Path, metavar="FILE")
     options = parser.parse_args()
     if options.inside:
         return inside(options.inside)
@@ -265,6 +259,9 @@ def main() -> None:
         lines = (ROOT / mutant.path).read_text(encoding="utf-8").splitlines()
         return print(mutant, lines[mutant.line - 1], sep="\n")
     os.chdir(ROOT)
+    for path in options.only:
+        if not Path(path.partition("::")[0]).exists():
+            parser.error(f"no such file: {path}")
     tests = reached(mutants, options.only, options.jobs)
     with ThreadPoolExecutor(options.jobs) as pool:
         results = []

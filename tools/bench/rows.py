@@ -20,7 +20,7 @@ def percentiles(values: Sequence[float]) -> Percentiles:
     """Return those of the values; infinity, as a lost answer is, if there are none."""
     if len(values) < 2:
         return Percentiles(*(2 * (*values, math.inf))[:2])
-    cuts = quantiles(values, n=100)
+    cuts = quantiles(values, n=100, method="inclusive")
     return Percentiles(cuts[49], cuts[98])
 
 

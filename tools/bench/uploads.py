@@ -1,6 +1,7 @@
 """Missions uploaded by MAVSDK to the server and to MAVSDK's own mission server, by turns."""
 
 import signal
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import ExitStack
 from math import nan
@@ -46,21 +47,22 @@ def measure(tree: Path) -> Iterator[Row]:
     ):
         it.wait_for("rover 1: found")
         ends = [_connected(each, stack) for each in (it.port, port)]
-        for count in SIZES:
-            times: list[list[float]] = [[], []]
-            for number in range(WARM_UP + UPLOADS):
+        times: dict[tuple[int, int], list[float]] = defaultdict(list)
+        for number in range(WARM_UP + UPLOADS):
+            for count in SIZES:
                 items = _items(count, number)
-                for end, found in zip(ends, times, strict=True):
+                for at, end in enumerate(ends):
                     sleep(BETWEEN)
                     begin = perf_counter()
                     end.upload_mission(items)  # raises unless accepted
-                    found.append(perf_counter() - begin)
-            as_sent = [MissionItem.from_c_struct(item.to_c_struct()) for item in items]  # float32
-            for end in ends:
-                assert list(map(str, end.download_mission())) == list(map(str, as_sent))
-            ours, theirs = (median(found[WARM_UP:]) for found in times)
-            what = f"upload of {count} items → durable ack, p50"
-            yield Row(what, ours, "ms", theirs, "MAVSDK's server", "≤ 2×")
+                    times[count, at].append(perf_counter() - begin)
+        as_sent = [MissionItem.from_c_struct(item.to_c_struct()) for item in items]  # float32
+        for end in ends:
+            assert list(map(str, end.download_mission())) == list(map(str, as_sent))
+    for count in SIZES:
+        ours, theirs = (median(times[count, at][WARM_UP:]) for at in (0, 1))
+        what = f"upload of {count} items → durable ack, p50"
+        yield Row(what, ours, "ms", theirs, "MAVSDK's server", "≤ 2×")
 
 
 def _vehicle(port: int) -> None:
