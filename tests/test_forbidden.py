@@ -52,7 +52,7 @@ ALLOWED = {
     ("tools/mutants.py", "compile"): "code of this repository, with a fault in it",
     ("sim/rover_sim/ackermann.py", "random"): "a linkage that is off centre, by a seed",
     ("mav_tasks/links/memory.py", "random"): "the virtual net loses packets by a seed",
-    ("tools/bench/client_flood.py", "random"): "noise of a flood, the same in every run",
+    ("tools/bench/floods.py", "random"): "noise of a flood, the same in every run",
     ("sim/rover_sim/bullet.py", "random"): "sensor noise of a simulated rover, by a seed",
     ("sim/rover_sim/kinematic.py", "random"): "sensor noise of a simulated rover, by a seed",
     ("sim/rover_sim/estimator.py", "random"): "sensor noise of a simulated rover, by a seed",

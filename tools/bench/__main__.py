@@ -1,139 +1,85 @@
-"""Measures the server and prints one table. Nothing is asserted: take ratios, not figures.
+"""Measure this machine and print one table: each figure beside a yardstick of the same run.
 
-Everything runs on loopback, bounded in count and time. ``--profile FILE`` with one of ``commands``,
-``forwarding`` and ``uploads`` writes cProfile's figures of the server process. ``--against
-REVISION`` also measures a server of that revision, alternating with this one, with the same
-clients. ``--names N`` with ``turns`` prints the functions that are called most.
+Nothing is asserted: take ratios, not figures. Everything runs on loopback, bounded in count and
+time. With ``--against REVISION`` a server of that revision is measured, too, by the same clients,
+rovers and floods, in alternating order, so that a machine that slows down affects both alike.
 """
 
 import argparse
-import json
-from collections.abc import Callable
-from dataclasses import asdict
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
-from . import (
-    against,
-    calls,
-    carrier,
-    commands,
-    floods,
-    forwarding,
-    gateways,
-    load,
-    postgres,
-    queue,
-    scrapers,
-    setpoints,
-    simulation,
-    start,
-    stop,
-    strangers,
-    telemetry,
-    turns,
-    uploads,
-    web,
-)
-from .table import Row, render
+from tests.kit.other_revision import checked_out
 
-MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
-    "commands": commands.measure,
-    "durable": commands.measure_durable,
-    "postgres": postgres.measure,
-    "carrier": carrier.measure,
-    "gateways": gateways.measure,
-    "recorded": commands.measure_recorded,
-    "turns": turns.measure,
-    "stop": stop.measure,
+from . import driving, engine, fleet, floods, load, speed, uploads, web
+from .processes import BUILD, ROOT
+from .rows import Row, comparison, table
+
+#: of a server or an engine, which may be another revision's
+MEASUREMENTS: dict[str, Callable[[Path], Iterator[Row]]] = {
+    "commands": speed.commands,
+    "durable": speed.durable,
+    "postgres": speed.postgres,
+    "recorded": speed.recorded,
+    "stop": speed.stop,
+    "forwarding": speed.forwarding,
+    "telemetry": speed.telemetry,
+    "uploads": uploads.measure,
+    "start": speed.start,
+    "setpoints": driving.measure,
     "floods": floods.measure,
     "load": load.measure,
-    "strangers": strangers.measure,
-    "setpoints": setpoints.measure,
-    "scrapers": scrapers.measure,
-    "queue": queue.measure,
-    "forwarding": forwarding.measure,
-    "telemetry": telemetry.measure,
-    "simulation": simulation.measure,
-    "start": start.measure,
-    "calls": calls.measure,
-    "uploads": uploads.measure,
+    "gateways": driving.fleets,
+    "carrier": fleet.measure,
+    "turns": engine.turns,
+    "strangers": engine.strangers,
+    "queue": engine.queue,
+    "simulation": engine.simulation,
     "web": web.measure,
 }
-PROFILED: dict[str, Callable[[str], list[Row]]] = {
-    "commands": commands.measure,
-    "forwarding": forwarding.measure,
-    "uploads": uploads.measure,
-}
-#: measurements of a server process, which may run another revision
-OF_A_SERVER = (
-    "commands",
-    "durable",
-    "recorded",
-    "stop",
-    "floods",
-    "load",
-    "setpoints",
-    "forwarding",
-    "telemetry",
-    "uploads",
-)
 
 
 def main() -> None:
     """Run the measurements on the command line, or all of them."""
-    parser = argparse.ArgumentParser(prog="tools/bench/run", description=__doc__)
-    parser.add_argument("what", nargs="*", help=", ".join(MEASUREMENTS) + "; default: all")
-    parser.add_argument("--profile", metavar="FILE", help="profile the server of one measurement")
-    parser.add_argument("--against", metavar="REVISION", help="measure that revision's server, too")
-    parser.add_argument(
-        "--rounds",
-        type=int,
-        default=3,
-        metavar="N",
-        help="with --against: rounds (default 3)",
+    listed = "\n".join(
+        f"  {name:12}{(do.__doc__ or '').splitlines()[0]}" for name, do in MEASUREMENTS.items()
     )
-    parser.add_argument(
-        "--names",
-        type=int,
-        default=0,
-        metavar="N",
-        help="with turns: print the N most called functions",
+    parser = argparse.ArgumentParser(
+        prog="tools/bench/run",
+        description=f"{__doc__}\nrows:\n{listed}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--json", action="store_true", help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    unknown = set(arguments.what) - MEASUREMENTS.keys()
+    parser.add_argument("rows", nargs="*", metavar="ROWS", help="default: all")
+    parser.add_argument("--against", metavar="REVISION", help="measure that revision, too")
+    parser.add_argument("--rounds", type=int, default=3, metavar="N", help="with --against")
+    options = parser.parse_args()
+    unknown = set(options.rows) - MEASUREMENTS.keys()
     if unknown:
         parser.error(f"unknown: {', '.join(sorted(unknown))}")
-    if arguments.profile is not None:
-        if len(arguments.what) != 1 or arguments.what[0] not in PROFILED:
-            parser.error(f"--profile goes with one of {', '.join(PROFILED)}")
-        print(render(PROFILED[arguments.what[0]](arguments.profile)))
+    BUILD.mkdir(exist_ok=True)
+    names = options.rows or list(MEASUREMENTS)
+    if options.against is None:
+        print(table(measured(names, ROOT)))
         return
-    if arguments.against is not None:
-        _measure_against(parser, arguments)
-        return
-    rows = [row for name in arguments.what or MEASUREMENTS for row in _measured(name, arguments)]
-    print(json.dumps([asdict(row) for row in rows]) if arguments.json else render(rows))
+    with checked_out(options.against) as there:
+        found: dict[Path, list[Row]] = {ROOT: [], there: []}
+        for number in range(options.rounds):
+            for tree in (ROOT, there) if number % 2 else (there, ROOT):
+                found[tree] += measured(names, tree)
+    print(comparison(found[ROOT], found[there]))
 
 
-def _measured(name: str, arguments: argparse.Namespace) -> list[Row]:
-    if name == "turns":
-        return turns.measure(names=arguments.names)
-    return MEASUREMENTS[name]()
-
-
-def _measure_against(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
-    what = arguments.what or [*OF_A_SERVER, "turns"]
-    alone = [name for name in what if name not in (*OF_A_SERVER, "turns")]
-    if alone:
-        parser.error(f"--against does not go with {', '.join(alone)}")
-    if arguments.rounds < 1:
-        parser.error("--rounds: expected a number from 1 on")
-    if "turns" in what:
-        print(render(turns.measure(arguments.against, names=arguments.names)))
-    servers = [name for name in what if name != "turns"]
-    if servers:
-        pairs = against.measure(arguments.against, servers, rounds=arguments.rounds)
-        print(against.render(pairs))
+def measured(names: list[str], tree: Path) -> list[Row]:
+    """Return the rows; one that fails is told, and leaves the others, which took minutes, too."""
+    rows: list[Row] = []
+    for name in names:
+        print(f"{name}, {tree.name}", file=sys.stderr, flush=True)
+        try:
+            rows += MEASUREMENTS[name](tree)
+        except (AssertionError, OSError, ValueError, LookupError) as error:
+            print(f"{name} failed: {error}", file=sys.stderr, flush=True)
+    return rows
 
 
 if __name__ == "__main__":

@@ -1,54 +1,41 @@
-"""The baseline: asyncio's own UDP endpoints that only echo or forward.
+"""The yardstick: ``python -m tools.bench.bare PORT [TO]`` echoes datagrams, or forwards them.
 
-``python -m tools.bench.bare echo PORT`` · ``python -m tools.bench.bare forward PORT TO_PORT``
+It imports nothing else, as asyncio's receive buffers cost half in a process with a larger heap.
 """
 
 import asyncio
-import signal
 import sys
-from typing import cast
+from typing import Any
 
-from .child import HOST, READY
-
-
-class Echo(asyncio.DatagramProtocol):
-    """Sends each datagram back."""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Keep the transport for the answers."""
-        self._transport = cast(asyncio.DatagramTransport, transport)  # in 3.11 only in fact
-
-    def datagram_received(self, data: bytes, addr: tuple[str | int, int]) -> None:
-        """Send the datagram back."""
-        self._transport.sendto(data, addr)
+HOST = "127.0.0.1"
 
 
 class Forward(asyncio.DatagramProtocol):
-    """Forwards each datagram through another socket."""
+    """Sends each datagram on: through another transport, or back by its own."""
 
-    def __init__(self, out: asyncio.DatagramTransport, to: tuple[str, int]) -> None:
-        self._out = out
-        self._to = to
+    def __init__(self, out: Any = None, to: tuple[str, int] | None = None) -> None:
+        self.out, self.to = out, to
 
-    def datagram_received(self, data: bytes, _addr: tuple[str | int, int]) -> None:
-        """Forward the datagram."""
-        self._out.sendto(data, self._to)
+    def connection_made(self, transport: Any) -> None:
+        """Keep the transport for the answers."""
+        self.out = self.out or transport
+
+    def datagram_received(self, data: bytes, addr: Any) -> None:
+        """Send the datagram."""
+        self.out.sendto(data, self.to or addr)
 
 
-async def _serve(kind: str, port: int, to_port: int) -> None:
-    loop = asyncio.get_running_loop()
-    over = asyncio.Event()
-    loop.add_signal_handler(signal.SIGTERM, over.set)
-    if kind == "echo":
-        await loop.create_datagram_endpoint(Echo, local_addr=(HOST, port))
-    else:
-        out, _ = await loop.create_datagram_endpoint(asyncio.DatagramProtocol, local_addr=(HOST, 0))
-        await loop.create_datagram_endpoint(
-            lambda: Forward(out, (HOST, to_port)), local_addr=(HOST, port)
-        )
-    print(READY, flush=True)
-    await over.wait()
+async def serve(port: int, to: int = 0) -> None:
+    """Echo what comes to a port, or send it to another port."""
+    made = asyncio.get_running_loop().create_datagram_endpoint
+    out: tuple[Any, ...] = (None, None)
+    if to:
+        transport, _ = await made(asyncio.DatagramProtocol, local_addr=(HOST, 0))
+        out = transport, (HOST, to)
+    await made(lambda: Forward(*out), local_addr=(HOST, port))
+    print("ready", flush=True)
+    await asyncio.Event().wait()
 
 
 if __name__ == "__main__":
-    asyncio.run(_serve(sys.argv[1], int(sys.argv[2]), int(sys.argv[-1])))
+    asyncio.run(serve(*map(int, sys.argv[1:])))

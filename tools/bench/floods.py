@@ -1,184 +1,130 @@
-"""Floods from clients: their effect on STOP, setpoints and memory.
+"""STOPs, setpoints and memory of a server that a client floods with datagrams.
 
-The flood comes on the same link, which is the worst case. A command that the kernel drops counts as
-lost.
+The flood comes on the client's own link, which is the worst case, and reads no answers.
 """
 
-import json
-import os
-import socket
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+import random
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from itertools import count
 from pathlib import Path
-from statistics import quantiles
-from time import monotonic, perf_counter, sleep
 
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.signing import signed
 
-from .child import child, free_port, simulated_rovers, udp_socket
-from .client_flood import KINDS
-from .scripted import CLIENT, ScriptedVehicle, ground_station, loopback, meet
-from .table import Row
+from .driving import drive
+from .processes import beside, server, simulated_rovers
+from .rows import Row, percentiles
+from .speed import stopped
+from .wire import CLIENT, STATION, Speaker, introduced, move, stops
 
+ROVERS = 5
+SECONDS = 5.0  # of driving
 RATE = 20_000  # datagrams/s demanded; a slow machine sends fewer
 STOPS = 150
-BETWEEN = 0.01  # s
-PATIENCE = 0.25  # s without an effect: lost
-DRIVING = 5.0  # s
-GATHER = 4.0  # s
-STOP_GOAL = 5e-3  # s
-SETPOINT_GOAL = 5e-3  # s
-BEAT = 0.5  # s
-KILOBYTE = 1024
-ROVERS = 5
+AT_A_TIME = 64  # sockets of strangers at once
+SECRET = b"nobody knows this key at all ..."
+
+client = Encoder(CLIENT).encode
 
 
-@dataclass(slots=True)
-class Figures:
-    """Figures under one flood, in seconds."""
-
-    stop_p99: float
-    stops_lost: int
-    setpoint_p99: float
-    grown: int  # kB of memory that the server grew under the flood
+def commands() -> Iterator[bytes]:
+    """Yield submissions."""
+    return (client(move(number % 0xFFFFFF + 1)) for number in count())
 
 
-def measure() -> list[Row]:
-    """Return the rows of every kind of flood."""
-    calm = _figures("")
-    return [row for kind in KINDS for row in _rows(kind, _figures(kind), calm)]
+def broken() -> Iterator[bytes]:
+    """Yield noise and packets with a wrong bit by turns, the same in every run."""
+    source = random.Random(1)
+    for made in commands():
+        yield source.randbytes(source.randrange(1, 300))
+        raw = bytearray(made)
+        raw[source.randrange(len(raw))] ^= 1 << source.randrange(8)
+        yield bytes(raw)
 
 
-def _rows(kind: str, ours: Figures, calm: Figures) -> Iterator[Row]:
-    what = f"flood of {kind}"
-    yield Row(
-        f"{what}: STOP → zero, p99",
-        f"{ours.stop_p99 * 1e3:.2f} ms, {ours.stops_lost} of {STOPS} lost",
-        f"{calm.stop_p99 * 1e3:.2f} ms without",
-        f"{ours.stop_p99 / calm.stop_p99:.1f}×",
-        f"< {STOP_GOAL * 1e3:.0f} ms",
-        ours.stop_p99 < STOP_GOAL,
-    )
-    yield Row(
-        f"{what}: setpoint interval error, p99",
-        f"{ours.setpoint_p99 * 1e3:.2f} ms",
-        f"{calm.setpoint_p99 * 1e3:.2f} ms without",
-        f"{ours.setpoint_p99 / calm.setpoint_p99:.1f}×",
-        f"< {SETPOINT_GOAL * 1e3:.0f} ms",
-        ours.setpoint_p99 < SETPOINT_GOAL,
-    )
-    yield Row(f"{what}: memory grown", f"{ours.grown:,} kB", f"{calm.grown:,} kB", "", "", None)
+def uploads() -> Iterator[bytes]:
+    """Yield beginnings of uploads that are never continued, each of another system id."""
+    encoders = [Encoder(Address(number, 190)).encode for number in range(1, 255)]
+    for number in count():
+        yield encoders[number % 254](m.MissionCount(1, (1, 191)[number % 2], 1000, number % 3))
 
 
-def _figures(kind: str) -> Figures:
-    times, lost = _stops(kind)
-    errors, grown = _setpoints(kind)
-    return Figures(quantiles(times, n=100)[98], lost, quantiles(errors, n=100)[98], grown)
+def requests() -> Iterator[bytes]:
+    """Yield requests of every message, at the highest rate and once by turns."""
+    for number in count():
+        often, once = MavCmd.SET_MESSAGE_INTERVAL, MavCmd.REQUEST_MESSAGE
+        for wanted in ((often, 0, number % 400, 1.0), (once, 0, number % 400, 0.0)):
+            yield client(m.CommandLong(1, 1, *wanted, 0, 0, 0, 0, 0))
+
+
+FLOODS: dict[str, Callable[[], Iterator[bytes]]] = {
+    "commands": commands,
+    "broken": broken,
+    "uploads": uploads,
+    "requests": requests,
+    "signatures": lambda: (
+        signed(made, SECRET, link_id=1, timestamp=at) for at, made in enumerate(commands())
+    ),
+    "strangers": lambda: (client(STATION) for _ in count()),
+}
+
+
+def flood(packets: Iterator[bytes], rate: float, sockets: Callable[[], list[Speaker]]) -> None:
+    """Send datagrams at a rate, each AT_A_TIME from these sockets."""
+    begin = time.monotonic()
+    speakers: list[Speaker] = []
+    for sent, packet in enumerate(packets):
+        if sent % AT_A_TIME == 0:
+            speakers = sockets()
+        speakers[sent % len(speakers)].socket.send(packet)
+        ahead = begin + sent / rate - time.monotonic()
+        if sent % 10 == 0 and ahead > 0:
+            time.sleep(ahead)
+
+
+def from_clients(kind: str, port: int, rate: float) -> None:
+    """Flood a server: of strangers each AT_A_TIME have new sockets."""
+    own = [Speaker(to=port)]
+    strangers = kind == "strangers"
+    many = range(AT_A_TIME)
+    flood(FLOODS[kind](), rate, lambda: [Speaker(to=port) for _ in many] if strangers else own)
+
+
+def measure(tree: Path) -> Iterator[Row]:
+    """STOP → zero setpoint, setpoints, and memory, beside each of six floods; and without."""
+    found = {kind: _flooded(tree, kind) for kind in ("", *FLOODS)}
+    stop, _, error, memory = found.pop("")
+    for kind, (took, lost, late, grown) in found.items():
+        what, note = f"flood of {kind}", f"{lost} of {STOPS} lost"
+        yield Row(f"{what}: STOP → zero, p99", took, "ms", stop, "without", "≤ 5 ms", note)
+        yield Row(f"{what}: setpoint error, p99", late, "ms", error, "without", "≤ 5 ms")
+        yield Row(f"{what}: memory grown", grown, "kB", memory, "without")
+
+
+def _flooded(tree: Path, kind: str) -> tuple[float, int, float, float]:
+    """Return p99 of STOPs, how many were lost, p99 of setpoints' errors, and memory grown."""
+    with introduced(tree, is_limited=True) as (it, client, rover), _flood(kind, it.port):
+        times, lost = stops(lambda: stopped(client, rover), count=STOPS)
+    with (
+        simulated_rovers(ROVERS) as port,
+        server(tree, port, "--arming=server", is_timed=True, is_limited=True) as it,
+    ):
+        drive(it, ROVERS)
+        with _flood(kind, it.port):
+            before, began = it.memory(), time.monotonic()
+            time.sleep(SECONDS)
+            grown = it.memory() - before
+    errors = [error for _, at, error in it.results() if at >= began]
+    return percentiles(times).p99, lost, percentiles(errors).p99, grown
 
 
 @contextmanager
 def _flood(kind: str, port: int) -> Iterator[None]:
-    if not kind:
+    with beside(from_clients, kind, port, RATE) if kind else nullcontext():
+        time.sleep(0.5)
         yield
-        return
-    with child("client_flood", str(port), kind, str(RATE)):
-        sleep(0.5)
-        yield
-
-
-def _stops(kind: str) -> tuple[list[float], int]:
-    port = free_port()
-    with ExitStack() as stack:
-        client, vehicle_socket = (stack.enter_context(udp_socket()) for _ in range(2))
-        options = str(port), str(vehicle_socket.getsockname()[1]), "--default-limits"
-        stack.enter_context(child("server", *options, quiet=True))
-        vehicle = ScriptedVehicle(vehicle_socket)
-        meet(vehicle, client, loopback(port))
-        client.connect(loopback(port))
-        with _flood(kind, port):
-            return _stopped(client, vehicle_socket, vehicle)
-
-
-def _stopped(
-    client: socket.socket, vehicle_socket: socket.socket, vehicle: ScriptedVehicle
-) -> tuple[list[float], int]:
-    encoder = Encoder(CLIENT)
-    stop = m.CommandLong(1, 191, MavCmd.TASK_STOP, 0, 0, 0, 0, 0, 0, 0, 0)
-    times: list[float] = []
-    lost = 0
-    next_beat = 0.0
-    for _ in range(STOPS):
-        if monotonic() >= next_beat:
-            vehicle.beat()
-            client.send(encoder.encode(ground_station()))
-            next_beat = monotonic() + BEAT
-        _drain(vehicle_socket)
-        _drain(client)
-        start = perf_counter()
-        client.send(encoder.encode(stop))
-        if _zero_comes(vehicle_socket):
-            times.append(perf_counter() - start)
-        else:
-            lost += 1
-        sleep(BETWEEN)
-    return times, lost
-
-
-def _zero_comes(vehicle_socket: socket.socket) -> bool:
-    vehicle_socket.settimeout(PATIENCE)
-    with suppress(TimeoutError):
-        while vehicle_socket.recv(512)[7] != m.SetPositionTargetLocalNed.id:
-            pass
-        return True
-    return False
-
-
-def _setpoints(kind: str) -> tuple[list[float], int]:
-    port, vehicle_port = free_port(), free_port()
-    options = str(port), str(vehicle_port), "--drive", "--default-limits"
-    with (
-        simulated_rovers(ROVERS, vehicle_port),
-        udp_socket() as client,
-        child("server", *options, quiet=True) as said,
-    ):
-        client.connect(loopback(port))
-        sleep(GATHER)
-        encoder = Encoder(CLIENT)
-        for system_id in range(1, ROVERS + 1):
-            move = m.CommandLong(system_id, 191, MavCmd.TASK_MOVE, 0, 100, 0, 0, system_id, 0, 0, 5)
-            client.send(encoder.encode(move))
-        sleep(1.0)
-        server = _server_of(port)
-        with _flood(kind, port):
-            sleep(1.0)
-            before = _resident(server)
-            sleep(DRIVING)
-            grown = _resident(server) - before
-    errors: list[float] = json.loads(said[-1])
-    return errors, grown
-
-
-def _server_of(port: int) -> int:
-    """Return the process id of the server with this port in its arguments."""
-    for folder in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            words = (folder / "cmdline").read_bytes().split(b"\0")
-            if b"tools.bench.server" in words and str(port).encode() in words:
-                return int(folder.name)
-    return os.getpid()
-
-
-def _resident(process: int) -> int:
-    """Return the resident memory of a process, in kB."""
-    pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") // KILOBYTE
-
-
-def _drain(sock: socket.socket) -> None:
-    sock.settimeout(0.0)
-    with suppress(BlockingIOError):
-        while True:
-            sock.recv(2048)

@@ -1,391 +1,275 @@
-"""Load by who has no rights, for each listening thing: its cost, and what a STOP takes meanwhile.
+"""Load by who has no rights on each thing that listens, and what a STOP to it takes meanwhile.
 
-Real processes on loopback: a server with all kinds of links, the page, MCP over HTTP. Each load
-lasts some seconds. An operator's STOP goes to the thing that is under load: by MAVLink to the
-server's links, by HTTP to the page and to MCP, each time on a connection of its own.
+Each kind of load is bounded in connections and rate. A STOP is an operator's: by MAVLink, or by
+HTTP, each time on a connection of its own.
 """
 
 import http.client
-import json
+import math
 import os
 import re
 import resource
+import select
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 import tty
-from collections.abc import Callable, Iterator
+import urllib.request
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
-from statistics import median, quantiles
+from tempfile import TemporaryDirectory
+from typing import Any
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.signing import signed, timestamp_at
+from tests.kit.processes import free_tcp_ports
 
-from .child import END_WITHIN, HOST, ROOT, SERVER_FROM, child, free_port, simulated_rovers
-from .scripted import loopback
-from .table import Row
+from .floods import from_clients
+from .processes import CLI, HOST, Process, beside, environment, process, server, simulated_rovers
+from .rows import Row, percentiles
+from .wire import STOP, Speaker, effect, stops
 
-SECONDS = 6.0  # of each load
-SETTLES = 1.5  # s, from the begin of a load to its first STOP
+SECONDS = 5.0  # of each load
 APART = 0.1  # s between STOPs by MAVLink, each of another address
 APART_HTTP = 0.7  # s; one client's STOPs that are closer wait, so that they are no copies
 PATIENCE = 2.0  # s without an acknowledgement: lost
-GOAL = 0.05  # s
 SECRET = b"an operator's key of 32 bytes: ."
-STRANGERS = 5_000  # datagrams/s
-TICKS = os.sysconf("SC_CLK_TCK")
-LINKS = ("silent", "half a packet", "whole packets", "churn")
-PAGES = ("silent", "half a request", "half a body", "unread streams", "large bodies", "changes")
-AGENTS = ("silent", "half a request", "half a call", "sessions")
-STOP_CALL = {"name": "stop", "arguments": {}}
-VERSION = "2026-07-28"  # of MCP, without sessions
+ACKNOWLEDGED = re.compile(rb"\xfd.{6}\x4d\0\0" + STOP.command.to_bytes(2, "little"), re.DOTALL)
+LARGE = b'{"text": "x", "more": [' + b'{"a":1},' * 280_000 + b"1]}"
+TASK = b'{"goals": [{"kind": "wait", "duration": 1}], "delay": 5000}'
+SESSION = (
+    b'{"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"protocolVersion":'
+    b' "2025-11-25", "capabilities": {}, "clientInfo": {"name": "a", "version": "1"}}}'
+)
+CALL = (
+    b'{"jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": {"name": "stop", "arguments":'
+    b' {}, "_meta": {"io.modelcontextprotocol/protocolVersion": "2026-07-28",'
+    b' "io.modelcontextprotocol/clientInfo": {"name": "a", "version": "1"},'
+    b' "io.modelcontextprotocol/clientCapabilities": {}}}}'
+)
+JSON = {"content-type": "application/json"}
+OF_CALL = {
+    "accept": "application/json, text/event-stream",
+    "mcp-protocol-version": "2026-07-28",  # without sessions
+    "mcp-method": "tools/call",
+    "mcp-name": "stop",
+}
 
 
-@dataclass(slots=True)
-class Running:
-    """A process of ours: its log, and the folder of its store."""
-
-    pid: int
-    log: Path
-    store: Path | None = None
-
-    def figures(self) -> tuple[float, float, float, float]:
-        """Return memory in kB, processor time in s, log and store in kB."""
-        pages = int(Path(f"/proc/{self.pid}/statm").read_text().split()[1])
-        times = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
-        stored = 0 if self.store is None else sum(_size(each) for each in self.store.iterdir())
-        return (
-            pages * os.sysconf("SC_PAGE_SIZE") / 1024,
-            (int(times[11]) + int(times[12])) / TICKS,
-            _size(self.log) / 1024,
-            stored / 1024,
-        )
+def http_head(path: str, length: int = 0, method: str = "POST") -> bytes:
+    """Return the head of a request."""
+    head = f"{method} {path} HTTP/1.1\r\nHost: {HOST}\r\nContent-Length: {length}\r\n"
+    head += "Content-Type: application/json\r\nAccept: application/json, text/event-stream\r\n\r\n"
+    return head.encode()
 
 
-Stop = Callable[[], float | None]  # returns the seconds until it was acknowledged; None: lost
+EVENTS = http_head("/api/v1/events", method="GET")
 
 
-def measure() -> list[Row]:
-    """Return the rows of every thing under every load."""
+def held(port: int, number: int, request: bytes = b"", is_read: Any = 0) -> None:
+    """Hold so many connections; open those again that are closed."""
+    poll, opened = select.poll(), dict[int, socket.socket]()
+    while True:
+        while len(opened) < number:
+            with suppress(OSError):
+                made = socket.create_connection((HOST, port), 5)
+                made.setblocking(False)
+                opened[made.fileno()] = made
+                poll.register(made, select.POLLRDHUP | select.POLLIN * is_read)
+                made.send(request)
+        for fd, event in poll.poll(10):
+            if event == select.POLLIN:
+                opened[fd].recv(1 << 16)
+            else:
+                poll.unregister(fd)
+                opened.pop(fd).close()
+        time.sleep(0.01)
+
+
+def repeated(port: int, request: bytes, pause: float = 0.0, at_once: int = 1) -> None:
+    """Send a request again and again, each on a connection of its own, and read its answer."""
+    for _ in range(at_once - 1):
+        if not os.fork():
+            break
+    while True:
+        with suppress(OSError), socket.create_connection((HOST, port), 30) as connection:
+            connection.sendall(request)
+            while not pause and connection.recv(65536):
+                pass
+        time.sleep(pause)
+
+
+def posted(path: str, body: bytes, at_once: int = 2) -> tuple[Any, ...]:
+    """Return a load of changes."""
+    head = http_head(path, len(body)).replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n")
+    return repeated, head + body, 0.0, at_once
+
+
+def noise(fd: int) -> None:
+    """Write 100 kB/s of noise to a line, and read what comes."""
+    os.set_blocking(fd, False)
+    while True:
+        with suppress(BlockingIOError):
+            os.write(fd, os.urandom(1000))
+            os.read(fd, 65536)
+        time.sleep(0.01)
+
+
+SILENT = {"silent": (held, 1100)}
+HALF = {"half a request": (held, 1100, b"POST /api/v1/stop HTTP/1.1\r\nHo")}
+LINK: dict[str, tuple[Any, ...]] = {
+    **SILENT,
+    "half a packet": (held, 200, b"\xfd\x09"),
+    "whole packets": (held, 1100, b"\xfd\x09" + bytes(19)),  # wrong CRC
+    "churn": (repeated, b"\xfd\x09noise", 0.002),
+}
+PAGE: dict[str, tuple[Any, ...]] = {
+    **SILENT,
+    **HALF,
+    "half a body": (held, 900, http_head("/api/v1/stop", 9) + b"{"),
+    "unread streams": (held, 300, EVENTS),
+    "large bodies": posted("/api/v1/plans", LARGE),
+    "changes": posted("/api/v1/vehicles/1/tasks", TASK),
+}
+AGENTS: dict[str, tuple[Any, ...]] = {
+    **SILENT,
+    **HALF,
+    "half a call": (held, 900, http_head("/mcp", 9) + b"{"),
+    "sessions": posted("/mcp", SESSION, at_once=4),
+}
+STRANGERS = {"strangers": (lambda port: from_clients("strangers", port, 5_000),)}
+
+
+def measure(tree: Path) -> Iterator[Row]:
+    """STOP → acknowledgement of each thing that listens, under load by who has no rights."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, hard), hard))
-    try:
-        return [*_of_server(), *_of_page(), *_of_agents()]
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-
-
-def _rows(thing: str, kind: str, it: Running, stop: Stop, target: int, apart: float) -> list[Row]:
-    fds = (target,) if kind == "noise" else ()
-    load: AbstractContextManager[object]
-    if not kind:
-        load = nullcontext()
-    elif kind == "strangers":
-        load = child("client_flood", str(target), kind, str(STRANGERS))
-    else:
-        load = child("load_child", kind, str(target), pass_fds=fds)
-    print(f"load: {thing}, {kind or 'no load'}", file=sys.stderr, flush=True)
-    times, lost = list[float](), 0
-    before = it.figures()
-    began = time.monotonic()
-    with load:
-        time.sleep(SETTLES)
-        while time.monotonic() - began < SECONDS:
-            took = stop()
-            if took is None:
-                lost += 1
-            else:
-                times.append(took)
-            time.sleep(apart)
-        after = it.figures()
-        seconds = time.monotonic() - began
-    memory, cpu, log, store = (b - a for a, b in zip(before, after, strict=True))
-    what = f"{thing}, {kind or 'no load'}"
-    p99 = quantiles(times, n=100)[98] if len(times) > 1 else PATIENCE
-    shown = f"{p99 * 1e3:.1f} ms, p50 {median(times or [PATIENCE]) * 1e3:.1f} ms"
-    met = p99 < GOAL and not lost
-    tried = len(times) + lost
-    return [
-        Row(f"{what}: STOP → ack, p99", f"{shown}, {lost} of {tried} lost", "", "", "< 50 ms", met),
-        Row(f"{what}: memory grown", f"{memory / 1024:.1f} MB", "", "", "", None),
-        Row(f"{what}: processor", f"{100 * cpu / seconds:.0f} %", "", "", "", None),
-        Row(f"{what}: log", f"{log / seconds:.2f} kB/s", "", "", "", None),
-        Row(f"{what}: store", f"{store / seconds:.1f} kB/s", "", "", "", None),
-    ]
-
-
-def _of_server() -> Iterator[Row]:
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        ring = folder / "keys.toml"
-        given = ["keys", "add", "anna", "--role", "operator", "--hex", "--keys", str(ring)]
-        _run(*given, given=f"{SECRET.hex()}\n")
-        far, near = os.openpty()
-        tty.setraw(near)
-        udp = free_port()
-        signed_tcp, open_tcp, metrics = _free_tcp_ports(3)
-        it = stack.enter_context(
-            _server(
-                folder,
-                *("--client", f"udpin:{HOST}:{udp}"),
-                *("--client", f"tcpin:{HOST}:{signed_tcp}?unsigned=refuse"),
-                *("--client", f"tcpin:{HOST}:{open_tcp}"),
-                *("--client", f"serial:{os.ttyname(near)}:921600"),
-                *("--metrics", f"{HOST}:{metrics}", "--keys", str(ring)),
-            )
-        )
-        by_udp = stack.enter_context(_stops_by_udp(udp))
-        for kind in ("", "strangers"):
-            yield from _rows("UDP link", kind, it, by_udp, udp, APART)
-        for name, port, secret in (("signed", signed_tcp, SECRET), ("unsigned", open_tcp, None)):
-            for kind in LINKS:
-                with _stops_by_tcp(port, secret) as stop:
-                    yield from _rows(f"TCP link, {name}", kind, it, stop, port, APART)
-                stop = _stop_by_new_tcp(port, secret)
-                yield from _rows(f"TCP link, {name}, new client", kind, it, stop, port, APART)
-        yield from _rows("serial line", "noise", it, by_udp, far, APART)
-        for kind in ("silent", "half a request"):
-            yield from _rows("metrics", kind, it, by_udp, metrics, APART)
-
-
-def _of_page() -> Iterator[Row]:
-    with _stand() as (folder, udp):
-        command = ["web", "--store", "", "--listen", f"{HOST}:0"]
-        command += ["--server", f"udpout:{HOST}:{udp}"]
-        with _started(folder, "web", *command, ready=r"web page: http://[^:]+:(\d+)") as (it, at):
-            port = int(at)
-            stop = _stop_by_http(port)
-            while stop() is None:
+    yield from _of_links(tree)
+    for face, kinds, path, body, headers in (
+        ("web", PAGE, "/api/v1/stop", b"{}", {}),
+        ("mcp", AGENTS, "/mcp", CALL, OF_CALL),
+    ):
+        with _server(tree) as it, faced(tree, face, it.port) as (own, port):
+            stop = partial(_stop_by_http, f"http://{HOST}:{port}{path}", body, headers)
+            while stop() == math.inf:
                 time.sleep(0.2)
-            for kind in ("", *PAGES):
-                yield from _rows("page", kind, it, stop, port, APART_HTTP)
+            yield from _loaded(face, kinds, own, stop, port, APART_HTTP)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-def _of_agents() -> Iterator[Row]:
-    with _stand() as (folder, udp):
-        command = ["mcp", "--http", f"{HOST}:0", "--server", f"udpout:{HOST}:{udp}"]
-        with _started(folder, "mcp", *command, ready=r"use http://[^:]+:(\d+)") as (it, at):
-            port = int(at)
-            stop = _stop_by_mcp(port)
-            while stop() is None:
-                time.sleep(0.2)
-            for kind in ("", *AGENTS):
-                yield from _rows("MCP", kind, it, stop, port, APART_HTTP)
+def _loaded(
+    thing: str,
+    kinds: dict[str, tuple[Any, ...]],
+    it: Process,
+    stop: Callable[[], float],
+    target: int,
+    apart: float = APART,
+) -> Iterator[Row]:
+    def figures() -> tuple[float, ...]:
+        return it.memory() / 1e6, it.seconds(), it.size("log") / 1e3, it.size("*sqlite*") / 1e3
+
+    for kind, (do, *arguments) in {"no load": (None,), **kinds}.items():
+        before, began = figures(), time.monotonic()
+        with beside(do, target, *arguments) if do else nullcontext():
+            time.sleep(1.0)
+            times, lost = stops(stop, seconds=SECONDS, apart=apart)
+            seconds = time.monotonic() - began
+            memory, *grown = (b - a for a, b in zip(before, figures(), strict=True))
+        cpu, log, store = (each / seconds for each in grown)
+        note = f"{lost} of {lost + len(times)} lost; memory {memory:+.1f} MB,"
+        note += f" processor {cpu:.0%}, log {log:.2f} kB/s, store {store:.1f} kB/s"
+        p99 = math.inf if lost else percentiles(times).p99
+        yield Row(f"{thing}, {kind}: STOP → ack, p99", p99, "ms", goal="≤ 50 ms", note=note)
 
 
 @contextmanager
-def _stand() -> Iterator[tuple[Path, int]]:
-    """Run a server for a ``with`` block; yield its folder and the port of its clients."""
-    udp = free_port()
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        _server(Path(folder), "--client", f"udpin:{HOST}:{udp}"),
-    ):
-        yield Path(folder), udp
-
-
-@contextmanager
-def _server(folder: Path, *options: str) -> Iterator[Running]:
-    vehicle = free_port()
-    store = folder / "store"
-    store.mkdir()
-    command = ["serve", "--no-push", "--vehicle", f"udpout:{HOST}:{vehicle}", *options]
-    command += ["--store", str(store / "tasks.sqlite3")]
-    with (
-        simulated_rovers(1, vehicle),
-        _started(folder, "server", *command, ready=r"rover (\d+): found") as (it, _),
-    ):
-        it.store = store
+def _server(tree: Path, *options: str) -> Iterator[Process]:
+    options = ("--store=tasks.sqlite3", *options)
+    with simulated_rovers(1) as rover, server(tree, rover, *options, is_limited=True) as it:
+        it.wait_for("rover 1: found")
         time.sleep(2.0)  # what it asks the rover at first
         yield it
 
 
-@contextmanager
-def _started(folder: Path, name: str, *command: str, ready: str) -> Iterator[tuple[Running, str]]:
-    """Run a command for a ``with`` block; yield it, and what it said once it was ready."""
-    log = folder / f"{name}.log"
-    environment = os.environ | {"XDG_CONFIG_HOME": str(folder), "XDG_STATE_HOME": str(folder)}
-    environment.pop(SERVER_FROM, None)  # no setting of a server
-    with log.open("wb") as output:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "mav_tasks.cli", *command],
-            cwd=os.environ.get(SERVER_FROM, ROOT),
-            env=environment,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-        )
-    try:
-        while not (found := re.search(ready, log.read_text())):
-            if process.poll() is not None:
-                raise RuntimeError(log.read_text())
-            time.sleep(0.05)
-        yield Running(process.pid, log), found[1]
-    finally:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(END_WITHIN)
-        process.kill()
-
-
-def _run(*command: str, given: str) -> None:
-    words = [sys.executable, "-m", "mav_tasks.cli", *command]
-    subprocess.run(words, cwd=ROOT, input=given, text=True, check=True, capture_output=True)
-
-
-def _free_tcp_ports(count: int) -> list[int]:
+def _of_links(tree: Path) -> Iterator[Row]:
+    far, near = os.openpty()
+    tty.setraw(near)
+    closed, opened, metrics = free_tcp_ports(3)
     with ExitStack() as stack:
-        made = [stack.enter_context(socket.create_server((HOST, 0))) for _ in range(count)]
-        return [each.getsockname()[1] for each in made]
+        ring = Path(stack.enter_context(TemporaryDirectory()), "keys.toml")
+        words = ("keys", "add", "anna", "--role=operator", "--hex", f"--keys={ring}")
+        key = f"{SECRET.hex()}\n".encode()
+        subprocess.run([sys.executable, *CLI, *words], env=environment(tree), input=key, check=True)
+        links = [f"tcpin:{HOST}:{closed}?unsigned=refuse", f"tcpin:{HOST}:{opened}"]
+        links.append(f"serial:{os.ttyname(near)}:921600")
+        options = [f"--metrics={HOST}:{metrics}", f"--keys={ring}"]
+        it = stack.enter_context(_server(tree, *(f"--client={each}" for each in links), *options))
+        client = stack.enter_context(Speaker(to=it.port))
+
+        def by_udp() -> float:
+            client.drain()
+            return effect(client, next(_STOPS), m.CommandAck.id, at=client, within=PATIENCE)
+
+        yield from _loaded("UDP link", STRANGERS, it, by_udp, it.port)
+        yield from _loaded("serial line", {"noise": (noise,)}, it, by_udp, far)
+        yield from _loaded("metrics", {**SILENT, **HALF}, it, by_udp, metrics)
+        for name, port, secret in (("signed", closed, SECRET), ("unsigned", opened, b"")):
+            dial = partial(socket.create_connection, (HOST, port), PATIENCE)
+            with dial() as known:
+                stop = partial(_stop_by_tcp, partial(_same, known), secret)
+                yield from _loaded(f"TCP link, {name}", LINK, it, stop, port)
+            new = partial(_stop_by_tcp, dial, secret)
+            yield from _loaded(f"TCP link, {name}, new client", LINK, it, new, port)
 
 
-# STOP
+#: of other addresses, so that no STOP is a copy of the one before
+_STOPS = (
+    Encoder(Address(200 + number % 40, 1 + number // 40 % 250)).encode(STOP) for number in count()
+)
 
 
-def _senders() -> Iterator[Encoder]:
-    """Yield encoders of other addresses, so that no STOP is a copy of the one before."""
-    for number in count():
-        yield Encoder(Address(200 + number % 40, 1 + number // 40 % 250))
+def _same(known: socket.socket) -> AbstractContextManager[socket.socket]:
+    return nullcontext(known)
 
 
-def _acknowledged(read: Callable[[], bytes], began: float) -> float | None:
-    """Return the seconds until the acknowledgement of a STOP comes; None if it does not come."""
-    waited = b""
-    number = int(MavCmd.TASK_STOP).to_bytes(2, "little")
-    while time.perf_counter() - began < PATIENCE:
-        try:
-            more = read()
-        except OSError:
-            return None
-        if not more:
-            return None
-        waited = waited[-300:] + more
-        if re.search(rb"\xfd.{6}\x4d\0\0" + re.escape(number), waited, re.DOTALL):
-            return time.perf_counter() - began
-    return None
-
-
-STOP = m.CommandLong(1, 191, MavCmd.TASK_STOP, 0, 0, 0, 0, 0, 0, 0, 0)
-
-
-@contextmanager
-def _stops_by_udp(port: int) -> Iterator[Stop]:
-    senders = _senders()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.connect(loopback(port))
-        sock.settimeout(PATIENCE)
-
-        def stop() -> float | None:
-            sock.settimeout(0.0)
-            with suppress(OSError):
-                while sock.recv(2048):
-                    pass
-            sock.settimeout(PATIENCE)
-            began = time.perf_counter()
-            sock.send(next(senders).encode(STOP))
-            return _acknowledged(lambda: sock.recv(2048), began)
-
-        yield stop
-
-
-@contextmanager
-def _stops_by_tcp(port: int, secret: bytes | None) -> Iterator[Stop]:
-    """Stop on a connection that was there before the load."""
-    senders = _senders()
-    with socket.create_connection((HOST, port), PATIENCE) as connection:
-
-        def stop() -> float | None:
-            connection.settimeout(0.0)
-            with suppress(OSError):
-                while connection.recv(65536):
-                    pass
-            connection.settimeout(PATIENCE)
-            return _stop_on(connection, senders, secret, time.perf_counter())
-
-        stop()
-        yield stop
-
-
-def _stop_by_new_tcp(port: int, secret: bytes | None) -> Stop:
-    senders = _senders()
-
-    def stop() -> float | None:
-        began = time.perf_counter()
-        try:
-            with socket.create_connection((HOST, port), PATIENCE) as connection:
-                return _stop_on(connection, senders, secret, began)
-        except OSError:
-            return None
-
-    return stop
-
-
-def _stop_on(
-    connection: socket.socket, senders: Iterator[Encoder], secret: bytes | None, began: float
-) -> float | None:
-    packet = next(senders).encode(STOP)
-    if secret is not None:
+def _stop_by_tcp(dial: Callable[[], AbstractContextManager[socket.socket]], secret: bytes) -> float:
+    """Return the seconds of a STOP until its acknowledgement comes; infinity if it does not."""
+    packet, came, begin = next(_STOPS), b"", time.perf_counter()
+    if secret:
         packet = signed(packet, secret, link_id=1, timestamp=timestamp_at(time.time()))
-    try:
+    with suppress(OSError), dial() as connection:
         connection.sendall(packet)
-    except OSError:
-        return None
-    return _acknowledged(lambda: connection.recv(2048), began)
+        while time.perf_counter() < begin + PATIENCE and (more := connection.recv(2048)):
+            came = came[-300:] + more
+            if ACKNOWLEDGED.search(came):
+                return time.perf_counter() - begin
+    return math.inf
 
 
-def _asked(port: int, path: str, body: object, **headers: str) -> bytes:
-    connection = http.client.HTTPConnection(HOST, port, timeout=PATIENCE)
-    named = {name.replace("_", "-"): value for name, value in headers.items()}
-    named |= {"content-type": "application/json"}
-    try:
-        connection.request("POST", path, json.dumps(body), named)
-        return connection.getresponse().read()
-    finally:
-        connection.close()
+@contextmanager
+def faced(tree: Path, face: str, server: int) -> Iterator[tuple[Process, int]]:
+    """Run the page, or MCP over HTTP, for a ``with`` block; yield it, and its port."""
+    options = [f"--http={HOST}:0"] if face == "mcp" else ["--store=", f"--listen={HOST}:0"]
+    with process(*CLI, face, *options, f"--server=udpout:{HOST}:{server}", tree=tree) as it:
+        yield it, int(it.wait_for(rf"(?:page:|use) http://{HOST}:(\d+)"))
 
 
-def _timed(ask: Callable[[], bytes]) -> Stop:
-    def stop() -> float | None:
-        began = time.perf_counter()
-        try:
-            is_done = re.search(b"acknowledged|STOP is in force", ask())
-        except (OSError, http.client.HTTPException):
-            return None
-        return time.perf_counter() - began if is_done else None
-
-    return stop
+def asked(url: str, body: bytes | None = None, headers: Mapping[str, str] = JSON) -> bytes:
+    """Return the answer to JSON, or to nothing."""
+    request = urllib.request.Request(url, body, {**JSON, **headers})
+    with urllib.request.urlopen(request, timeout=15) as answer:
+        return bytes(answer.read())
 
 
-def _stop_by_http(port: int) -> Stop:
-    return _timed(lambda: _asked(port, "/api/v1/stop", {}))
-
-
-def _stop_by_mcp(port: int) -> Stop:
-    meta = {
-        "io.modelcontextprotocol/protocolVersion": VERSION,
-        "io.modelcontextprotocol/clientInfo": {"name": "a", "version": "1"},
-        "io.modelcontextprotocol/clientCapabilities": {},
-    }
-    call = {"jsonrpc": "2.0", "id": 1, "method": "tools/call"}
-    call |= {"params": STOP_CALL | {"_meta": meta}}
-    named = {
-        "accept": "application/json, text/event-stream",
-        "mcp_protocol_version": VERSION,
-        "mcp_method": "tools/call",
-        "mcp_name": "stop",
-    }
-    return _timed(lambda: _asked(port, "/mcp", call, **named))
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError:
-        return 0
+def _stop_by_http(url: str, body: bytes, headers: Mapping[str, str]) -> float:
+    begin = time.perf_counter()
+    with suppress(OSError, http.client.HTTPException):
+        if re.search(b"acknowledged|STOP is in force", asked(url, body, headers)):
+            return time.perf_counter() - begin
+    return math.inf

@@ -1,0 +1,192 @@
+"""Processes of a measurement: started, watched in /proc, ended by their own id.
+
+A server is ``mav-tasks serve`` of any revision: ``tree`` is the folder of its files. No process
+sees the user's configuration, keys or store.
+"""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from rover_sim.postgres import installed
+from tests.kit.postgres import PostgresServer
+from tests.kit.processes import free_udp_ports, wait_until
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = ROOT / "build"  # on the project's disk
+HOST = "127.0.0.1"
+START_WITHIN = 20.0  # s
+END_WITHIN = 10.0  # s
+CLI = ("-P", "-m", "mav_tasks.cli")
+TIMED_CLI = ("-P", str(Path(__file__).with_name("timed_serve.py")))
+DEFAULTS = {"--store": "--store=:memory:", "--push": "--no-push"}
+#: as many commands as a measurement has, at any rate
+UNLIMITED = [
+    f"--set={setting}"
+    for setting in (
+        *("queueing.capacity=100000", "queueing.quota=100000", "clients.packet_rate=1000000"),
+        *("clients.stream_interval=0", "roles.safety.quota=1000000", "roles.safety.rate=100000"),
+    )
+]
+
+
+@dataclass
+class Process:
+    """A process in a folder of its own; ``port`` is a server's, for clients."""
+
+    pid: int
+    folder: Path
+    port: int = 0
+    said: str = ""  # at its end
+
+    def text(self) -> str:
+        """Return what it has written so far."""
+        return (self.folder / "log").read_text(encoding="utf-8", errors="replace")
+
+    def wait_for(self, pattern: str, *, count: int = 1) -> str:
+        """Wait until it has written that; return the last group, or match."""
+        found = wait_until(
+            lambda: (found := re.findall(pattern, self.text()))[count - 1 :] and found,
+            within=START_WITHIN,
+            what=lambda: f"{pattern} in {self.text()[-2000:]}",
+        )
+        return str(found[-1])
+
+    def seconds(self) -> float:
+        """Return the processor time that it has used."""
+        return cpu_seconds(self.pid)
+
+    def memory(self) -> int:
+        """Return its resident memory, in bytes."""
+        pages = Path(f"/proc/{self.pid}/statm").read_text(encoding="ascii").split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+    def size(self, pattern: str) -> int:
+        """Return the size of files in its folder, in bytes."""
+        return sum(each.stat().st_size for each in self.folder.glob(pattern))
+
+    def results(self) -> list[list[float]]:
+        """Return what it printed as JSON in its last line, once it has ended."""
+        found: list[list[float]] = json.loads(self.said.splitlines()[-1])
+        return found
+
+
+def environment(tree: Path) -> dict[str, str]:
+    """Return an environment with the modules of a tree, whose bytecode is kept, as installed."""
+    paths = {"PYTHONPATH": f"{tree}:{tree / 'sim'}", "MAV_TASKS_CONFIG": ""}
+    return {**os.environ, **paths, "PYTHONHASHSEED": "0", "PYTHONDONTWRITEBYTECODE": ""}
+
+
+@contextmanager
+def process(*arguments: str, tree: Path = ROOT, ready: str = "") -> Iterator[Process]:
+    """Run Python for a ``with`` block, with the modules of a tree, once it says it is ready."""
+    with TemporaryDirectory(dir=BUILD) as name:
+        folder = Path(name)
+        homes = {f"XDG_{kind}_HOME": name for kind in ("CONFIG", "DATA", "STATE")}
+        with (folder / "log").open("wb") as log:
+            started = subprocess.Popen(
+                [sys.executable, *arguments],
+                env={**environment(tree), **homes},
+                cwd=folder,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+        it = Process(started.pid, folder)
+        try:
+            if ready:
+                it.wait_for(ready)
+            yield it
+        finally:
+            started.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                started.wait(END_WITHIN)
+            started.kill()
+            started.wait()
+            it.said = it.text()
+
+
+@contextmanager
+def beside(do: Callable[..., object], *arguments: object) -> Iterator[None]:
+    """Call a function in a process of its own for a ``with`` block, then kill it."""
+    pid = os.fork()
+    if not pid:
+        os.setpgrp()
+        try:
+            do(*arguments)
+        finally:
+            os._exit(1)  # what has to be cleaned up is the parent's
+    os.setpgid(pid, pid)
+    try:
+        yield
+    finally:
+        os.killpg(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+
+
+def bare(*ports: int) -> AbstractContextManager[Process]:
+    """Run the yardstick: an echo, or a forwarder to the second port."""
+    words = (str(Path(__file__).with_name("bare.py")), *map(str, ports))
+    return process(*words, ready="ready\n")
+
+
+@contextmanager
+def server(
+    tree: Path, rover: int, *options: str, is_timed: bool = False, is_limited: bool = False
+) -> Iterator[Process]:
+    """Run a server for a ``with`` block, for a client's port and a rover's.
+
+    With ``is_timed``, its results are triples: a rover's system id, when a moving setpoint to it
+    left, and the deviation from 1/20 s of the time since the one before.
+    """
+    (port,) = free_udp_ports(1)
+    links = f"--client=udpin:{HOST}:{port}", f"--vehicle=udpout:{HOST}:{rover}"
+    limits = [] if is_limited else UNLIMITED
+    missing = [
+        word
+        for name, word in DEFAULTS.items()
+        if not any(each.startswith(name) for each in options)
+    ]
+    with process(
+        *(TIMED_CLI if is_timed else CLI),
+        *("serve", "--config=", *links, *limits, *missing, *options),
+        tree=tree,
+    ) as it:
+        it.port = port
+        yield it
+
+
+@contextmanager
+def simulated_rovers(count: int, *, first: int = 1) -> Iterator[int]:
+    """Run kinematic rovers for a ``with`` block; yield their UDP port."""
+    (port,) = free_udp_ports(1)
+    numbers = f"--count={count}", f"--system-id={first}", f"--port={port}"
+    with process("-m", "rover_sim", "--body=kinematic", "--boot=none", *numbers):
+        yield port
+
+
+@contextmanager
+def database() -> Iterator[PostgresServer]:
+    """Run a database server for a ``with`` block, as durable as a user's."""
+    made = PostgresServer(installed())
+    try:
+        made.start()
+        yield made
+    finally:
+        made.close()
+
+
+def cpu_seconds(*pids: int | str) -> float:
+    """Return the processor time that processes have used."""
+    ticks = 0
+    for pid in pids:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
