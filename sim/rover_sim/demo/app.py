@@ -57,7 +57,7 @@ def demo(
         int, Option(help="Seed of the friction, which varies by 30 %; 0: no variation.")
     ] = 0,
 ) -> None:
-    """Drive three tasks that a client submits, and measure the result."""
+    """Run the demonstration: three tasks, driven and measured."""
     screen = Screen()
     kind = body or ("bullet" if has_pybullet() else "kinematic")
     if body is None and kind == "kinematic":
