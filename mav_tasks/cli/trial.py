@@ -138,7 +138,7 @@ async def trial(
 
 
 def _confirm(rows: list[str]) -> None:
-    if not sys.stdin.isatty():
+    if sys.stdin is None or not sys.stdin.isatty():
         raise UsageError("the rover drives: without a terminal, add --yes")
     needs = "".join(f"  {name}: {ROOM[name]}\n" for name in rows)
     sys.stderr.write(

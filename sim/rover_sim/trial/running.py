@@ -74,6 +74,12 @@ async def run_trial(options: Options, report: Report, *, say: Callable[[str], No
             options.reboot_command,
         )
         session = Session(ground, options.limits, say, best=options.stop_distance)
+
+        def write() -> None:
+            if report.rows:
+                report.write(session.track, is_true=truth is not None)
+
+        stack.callback(write)  # drawing takes seconds: the rover is stopped first
         stack.push_async_callback(session.end)
         if truth is not None:
             await session.until(lambda: len(truth) > 0, within=TRUTH_WITHIN, what="true poses")
@@ -87,9 +93,6 @@ async def run_trial(options: Options, report: Report, *, say: Callable[[str], No
         except BaseException as error:
             report.ended = str(error) or "interrupted"
             raise
-        finally:
-            if report.rows:
-                report.write(session.track, is_true=truth is not None)
 
 
 def _truth(options: Options, stack: AsyncExitStack) -> tuple[Track | None, Observer | None]:

@@ -16,6 +16,7 @@ from mav_tasks.client.values import TaskStatus, VehicleStatus
 from mav_tasks.client.wire import Goal
 from mav_tasks.links.base import Link
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from rover_sim.observing.driver import Driver
 from rover_sim.observing.observer import Observer
 from rover_sim.observing.track import Place, Track
 
@@ -25,6 +26,7 @@ ASK = 0.5  # s between two requests for a task's state
 FOUND_WITHIN = 60.0  # s; an ArduPilot restarts within 10 s, PX4 within 5 s
 POSITION_WITHIN = 20.0  # s
 STANDS_WITHIN = 8.0  # s
+BEAT_WITHIN = 3.0  # s, for a heartbeat once no server runs
 RELEASED_WITHIN = 60.0  # s that a released task waits for a booting rover: ArduPilot, 41 s
 SETTLE = 0.6  # s at rest before a measurement: the track's window and a margin
 EVEN_WHILE_ARMED = 20190226.0  # param6 of PREFLIGHT_REBOOT_SHUTDOWN
@@ -166,13 +168,26 @@ class Session:
             await client.close()
 
     async def end(self) -> None:
-        """Stop the rover, if there is a client, and end the server."""
-        if self._client is not None:
-            await quietly(lambda: self.client.stop(within=2.0))
-        if self._sampling is not None:
-            self._sampling.cancel()
-        await self.disconnect()
-        await self.ground.server.end()
+        """Stop the rover, and end the server."""
+        try:
+            if self.rover is not None:
+                await quietly(lambda: self.client.stop(within=2.0))
+            if self._sampling is not None:
+                self._sampling.cancel()
+            await self.disconnect()
+        finally:
+            await self.ground.server.end()
+            await self._stop_without_server()
+
+    async def _stop_without_server(self) -> None:
+        """Bring the rover to rest if it still follows setpoints, as after a killed server."""
+        observer = Observer(self.ground.rover())
+        try:
+            driver = Driver(observer)
+            if await observer.found(BEAT_WITHIN) and driver.mode == driver.make.control:
+                await driver.rest()
+        finally:
+            observer.close()
 
     # state
 
