@@ -6,6 +6,7 @@ rovers and floods, in alternating order, so that a machine that slows down affec
 """
 
 import argparse
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -58,6 +59,7 @@ def main() -> None:
     if unknown:
         parser.error(f"unknown: {', '.join(sorted(unknown))}")
     BUILD.mkdir(exist_ok=True)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # ends its processes
     names = options.rows or list(MEASUREMENTS)
     if options.against is None:
         print(table(measured(names, ROOT)))
