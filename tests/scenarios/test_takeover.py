@@ -36,6 +36,7 @@ WAYS: dict[str, Callable[[World], object]] = {
     "disarm at the rover": lambda w: w.operator_arm(False),
     "sticks": lambda w: w.client.send(sticks(x=300)),
     "throttle stick": lambda w: w.client.send(sticks(z=500)),
+    "throttle beyond its range": lambda w: w.client.send(sticks(z=32_720)),
     "RC override": lambda w: w.client.send(rc_override(1500, 1500, 1700, 1500)),
     "setpoints of a second server": lambda w: w.from_vehicle_side(packed(setpoint(1.0), 250, 191)),
     "setpoints of anybody": lambda w: w.from_vehicle_side(packed(setpoint(1.0), 9, 9)),

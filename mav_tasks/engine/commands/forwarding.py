@@ -138,11 +138,13 @@ def _is_finite(message: m.Message) -> bool:
 
 def _has_moved(message: m.ManualControl, client: GcsClient, throttles: Iterable[int]) -> bool:
     """Whether a stick is off its centre, or the throttle has jumped from one centre to another."""
-    centre = min((*throttles, NO_STICK), key=lambda each: abs(message.z - each))
-    before, client.throttle_centre = client.throttle_centre, centre
-    sticks = (message.x, message.y, message.z - centre, message.r)
-    is_off = any(abs(stick) > STICKS_CENTRED for stick in sticks if stick != NO_STICK)
-    return is_off or before not in (None, centre)
+    sticks, has_jumped = [message.x, message.y, message.r], False
+    if message.z != NO_STICK:
+        centre = min(throttles, key=lambda each: abs(message.z - each))
+        has_jumped = client.throttle_centre not in (None, centre)
+        client.throttle_centre = centre
+        sticks.append(message.z - centre)
+    return has_jumped or any(abs(s) > STICKS_CENTRED for s in sticks if s != NO_STICK)
 
 
 def _is_off_centre(message: m.RcChannelsOverride) -> bool:
