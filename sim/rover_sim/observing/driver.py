@@ -6,7 +6,7 @@ armed, it is in the mode that follows setpoints, and it is near the place where 
 
 import asyncio
 from dataclasses import dataclass
-from math import cos, hypot, inf, sin
+from math import cos, hypot, inf, isfinite, sin
 
 from pymavlink.dialects.v20 import development as mav
 
@@ -176,6 +176,8 @@ class Driver:
             await asyncio.sleep(max(0.0, begin + (step + 1) * PERIOD - self.observer.now))
 
     def _send(self, frame: int, mask: int, vx: float, vy: float, yaw_rate: float = 0.0) -> None:
+        if not isfinite(vx + vy + yaw_rate):
+            raise Interference("its heading is not a number")
         self.last_setpoint_at = self.observer.now
         self.observer.out.set_position_target_local_ned_send(
             *(0, self.observer.system, AUTOPILOT, frame, mask),
