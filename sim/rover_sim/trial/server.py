@@ -1,6 +1,7 @@
 """``mav-tasks serve`` as a process, on a store that outlives it."""
 
 import asyncio
+import ctypes
 import signal
 import sys
 from collections.abc import Sequence
@@ -8,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 END_WITHIN = 15.0  # s; the server waits up to 3 s for the rover to stop
+PR_SET_PDEATHSIG = 1  # prctl(2)
 
 
 class ServerProcess:
@@ -29,6 +31,7 @@ class ServerProcess:
                 stdout=output,
                 stderr=asyncio.subprocess.STDOUT,
                 start_new_session=True,  # only we handle Ctrl-C, and end the server last
+                preexec_fn=_end_with_its_parent,
             )
 
     async def end(self) -> None:
@@ -52,3 +55,8 @@ class ServerProcess:
         if self._process is None or self._process.returncode is None:
             return ""
         return (self.log.read_text(errors="replace").splitlines() or ["it said nothing"])[-1]
+
+
+def _end_with_its_parent() -> None:
+    """Let the server stop its rovers and end if the trial is killed."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
