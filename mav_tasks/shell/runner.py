@@ -198,12 +198,20 @@ class Runner:
         """When the present callback began, and with it the reading of what it handles."""
         return self._ran_at
 
-    async def run(self) -> int:
-        """Serve until SIGINT or SIGTERM; return the exit code, or EVICTED."""
-        self._loop = asyncio.get_running_loop()
-        self._over = self._loop.create_future()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._loop.add_signal_handler(number, self._on_signal)
+    def serve(self) -> int:
+        """Serve until SIGINT or SIGTERM; return the exit code, or EVICTED.
+
+        The loop has their handlers before it runs: one that raises there could make it forget the
+        task that it was about to start, and the process would never end.
+        """
+        with asyncio.Runner() as runner:
+            self._loop = runner.get_loop()
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._loop.add_signal_handler(number, self._on_signal)
+            return runner.run(self._serve(self._loop))
+
+    async def _serve(self, loop: asyncio.AbstractEventLoop) -> int:
+        self._over = loop.create_future()
         try:
             if self._keys.keys is not None:
                 self._put_keys(self._keys.keys)
@@ -216,24 +224,24 @@ class Runner:
                     is_signed = not policy.takes_unsigned
                     link.watch(is_heard, has_packet=has_packet, is_signed=is_signed)
             for link, _ in self._sides:
-                self._loop.add_reader(link.fileno(), self._on_readable)
+                loop.add_reader(link.fileno(), self._on_readable)
             if self._store_fd is not None:
-                self._loop.add_reader(self._store_fd, self._on_stored)
+                loop.add_reader(self._store_fd, self._on_stored)
             if self._lease is not None and (lease_fd := self._lease.fileno()) is not None:
-                self._loop.add_reader(lease_fd, self._on_lease, self._lease)
-                self._hear(self._lease, self._loop)
-            self._tend(self._loop)
-            self._loop.add_signal_handler(signal.SIGHUP, self._on_hangup)
+                loop.add_reader(lease_fd, self._on_lease, self._lease)
+                self._hear(self._lease, loop)
+            self._tend(loop)
+            loop.add_signal_handler(signal.SIGHUP, self._on_hangup)
             if self._reload.was_asked:
                 self._reload.begin(self._put)
             return await self._over
         finally:
             if self._store_fd is not None:
-                self._loop.remove_reader(self._store_fd)
+                loop.remove_reader(self._store_fd)
             if self._lease is not None and (lease_fd := self._lease.fileno()) is not None:
-                self._loop.remove_reader(lease_fd)
+                loop.remove_reader(lease_fd)
             for link, _ in self._sides:
-                self._loop.remove_reader(link.fileno())
+                loop.remove_reader(link.fileno())
                 link.close()
             self._reader.close()
             self._keys.close()

@@ -1,6 +1,5 @@
 """The composition root: starts a server from its settings, with links, store and runner."""
 
-import asyncio
 import gc
 import json
 import logging
@@ -139,7 +138,7 @@ def _serve(settings: ServerSettings, reload: Reload) -> int:
             say(f"parameters of an earlier run: {told}")
         if PLUGGED.broken:
             say(PLUGGED.broken)
-        running = _run(
+        return _run(
             settings,
             store,
             restored,
@@ -151,7 +150,6 @@ def _serve(settings: ServerSettings, reload: Reload) -> int:
             metrics,
             gateway,
         )
-        return asyncio.run(running)
 
 
 def _join(settings: ServerSettings) -> "Gateway | None":
@@ -227,7 +225,7 @@ def _metrics(opened: ExitStack, metrics: Metrics) -> "Endpoint | None":
     return endpoint
 
 
-async def _run(
+def _run(
     settings: ServerSettings,
     store: Store,
     restored: Restored | None,
@@ -272,7 +270,7 @@ async def _run(
         keys=keys,
         lease=gateway,
     )
-    return await runner.run()
+    return runner.serve()
 
 
 def _say(words: str, *, as_json: bool) -> None:
