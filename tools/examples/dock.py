@@ -1,7 +1,10 @@
 """A kind of task from outside the package: face away from a dock, back in, switch the charger on.
 
-A package of its own installs it, with this in its pyproject.toml:
+``pip install .`` where mav-tasks is installs it, with this in a pyproject.toml beside it:
 
+    [project]
+    name = "dock"
+    version = "0.1"
     [project.entry-points."mav_tasks.kinds"]
     dock = "dock:FORM"
 
