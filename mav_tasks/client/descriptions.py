@@ -25,7 +25,7 @@ REMEDIES: dict[TaskReason, str] = {
         "Once nobody else drives it, centre the sticks, set HOLD, then {resume}."
     ),
     TaskReason.FAILSAFE: "Remove the cause of the failsafe, set HOLD, then {resume}.",
-    TaskReason.DISARMED: "Arm the rover in HOLD; or, if the server may arm it, {resume}.",
+    TaskReason.DISARMED: "Set HOLD and arm the rover, unless the server may; then {resume}.",
     TaskReason.WRONG_MODE: "Set the rover to HOLD, then {resume}.",
     TaskReason.NOT_READY: "Wait, or mend what the rover reports.",
     TaskReason.NO_POSITION: "Wait until the rover knows its position; check its GPS.",
