@@ -31,22 +31,14 @@ def sides_of(motion: Motion) -> tuple[float, float]:
     return speed + rate * HALF_TRACK, speed - rate * HALF_TRACK  # clockwise: left is faster
 
 
-def motion_of(left: float, right: float) -> Motion:
-    """Return the motion for these speeds of the left and the right wheels, m/s."""
-    return (left + right) / 2.0, (left - right) / (2.0 * HALF_TRACK)
-
-
 def with_frozen(motion: Motion, last: Motion, frozen: Collection[Actuator]) -> Motion:
     """Return the motion with the ``frozen`` outputs kept at their values in ``last``."""
     if not frozen:
         return motion
     if SIDES & set(frozen):
-        left, right = sides_of(motion)
-        last_left, last_right = sides_of(last)
-        return motion_of(
-            last_left if Actuator.LEFT in frozen else left,
-            last_right if Actuator.RIGHT in frozen else right,
-        )
+        left = sides_of(last if Actuator.LEFT in frozen else motion)[0]
+        right = sides_of(last if Actuator.RIGHT in frozen else motion)[1]
+        return (left + right) / 2.0, (left - right) / (2.0 * HALF_TRACK)
     speed = last[0] if Actuator.THROTTLE in frozen else motion[0]
     curvature_of = last if Actuator.STEERING in frozen else motion
     return speed, speed * curvature_of[1] / curvature_of[0] if curvature_of[0] else 0.0
@@ -62,10 +54,7 @@ def with_blocked(motion: Motion, blocked: Collection[Actuator], frame: Frame) ->
         speed = motion[0] * DRAG
         pull = -PULL if Actuator.LEFT in blocked else PULL
         return speed, motion[1] * DRAG + pull * speed
-    left, right = sides_of(motion)
-    return motion_of(
-        0.0 if Actuator.LEFT in blocked else left, 0.0 if Actuator.RIGHT in blocked else right
-    )
+    return with_frozen(motion, (0.0, 0.0), blocked)
 
 
 def wheels_of(side: str) -> frozenset[Actuator]:

@@ -7,10 +7,10 @@ import math
 from typing import Any
 
 from rover_sim.ackermann import steering_for
+from rover_sim.actuators import HALF_TRACK, sides_of
 from rover_sim.frames import SERVO_RATE, WHEEL_BASE
 
-WHEEL_RADIUS = 0.1  # m, as in the URDFs; the next one, too
-HALF_TRACK = 0.23  # m, middle to wheel
+WHEEL_RADIUS = 0.1  # m, as in the URDFs
 MAX_TORQUE = 20.0  # N·m per wheel; a turn on the spot takes 9 at friction 1.1, and stalls with 6
 SERVO_TORQUE = 20.0  # N·m; the wheels turn on their contact points
 SIDES = ("front_left", "front_right", "rear_left", "rear_right")
@@ -39,16 +39,15 @@ class Wheels:
             self._steering = steering_for(forward_speed, yaw_rate, self._steering)
             yaw_rate = forward_speed * math.tan(self._steering) / WHEEL_BASE
             self._steer(steps)
-        left = (forward_speed + yaw_rate * HALF_TRACK) / WHEEL_RADIUS  # clockwise: left is faster
-        right = (forward_speed - yaw_rate * HALF_TRACK) / WHEEL_RADIUS
-        torque = MAX_TORQUE / steps
-        rolls = bool(self._knuckles)  # the front wheels: freely
+        sides = [each / WHEEL_RADIUS for each in sides_of((forward_speed, yaw_rate))]
+        torques = [MAX_TORQUE / steps] * 2
+        free = [0.0, 0.0] if self._knuckles else None  # the front wheels of a steered rover
         self._p.setJointMotorControlArray(
             self._rover,
             self.axles,
             self._p.VELOCITY_CONTROL,
-            targetVelocities=(*((0.0, 0.0) if rolls else (left, right)), left, right),
-            forces=(*((0.0, 0.0) if rolls else (torque, torque)), torque, torque),
+            targetVelocities=(free or sides) + sides,
+            forces=(free or torques) + torques,
             physicsClientId=self._client,
         )
 

@@ -2,8 +2,8 @@
 
 MAVLink guide, "Command Protocol": exactly one COMMAND_ACK each, progress and result_param2 always
 0, addressed to the sender. There is no de-duplication: a repeat is executed again. The persona's
-table ``commands`` names the method of ``Commands`` for each command, or its fixed result, and
-``results`` the results of what a make refuses in its own way.
+table ``commands`` names the method of ``Commands`` for each command, with its argument if any, or
+its fixed result, and ``results`` the results of what a make refuses in its own way.
 """
 
 import math
@@ -50,7 +50,8 @@ class Commands:
             return None
         if action in MavResult.__members__:
             return MavResult[action]
-        return self.result_of(getattr(self, action)(command))
+        name, *words = action.split()
+        return self.result_of(getattr(self, name)(command, *words))
 
     def result_of(self, outcome: Outcome) -> MavResult:
         """Return the result that an action means."""
@@ -98,9 +99,9 @@ class Commands:
         mode = next((each.mode for each in offered if each.standard == number), None)
         return MavResult.FAILED if mode is None else self._flight.request_mode(mode)
 
-    def return_to_launch(self, _command: Command) -> Outcome:
-        """Enter RTL."""
-        return self._flight.request_mode(Mode.RTL)
+    def enter(self, _command: Command, mode: str) -> Outcome:
+        """Enter the mode with this name."""
+        return self._flight.request_mode(Mode(mode))
 
     def refuse_to_fly(self, _command: Command) -> Outcome:
         """Refuse takeoff and landing: a rover has no mode for them."""
@@ -252,17 +253,9 @@ class Commands:
                 )
         return True
 
-    def request_capabilities(self, _command: Command) -> Outcome:
-        """Send AUTOPILOT_VERSION."""
-        return self._told(messages.AutopilotVersion.id)
-
-    def request_protocol_version(self, _command: Command) -> Outcome:
-        """Send PROTOCOL_VERSION; without it QGroundControl falls back to MAVLink 1."""
-        return self._told(messages.ProtocolVersion.id)
-
-    def get_home(self, _command: Command) -> Outcome:
-        """Send HOME_POSITION."""
-        return self._told(messages.HomePosition.id)
+    def tell(self, _command: Command, message: str) -> Outcome:
+        """Send the message with this name."""
+        return self._told(getattr(messages, message).id)
 
     def _told(self, message_id: int) -> Outcome:
         return self._send(message_id) or self._results["unknown_message"]
