@@ -15,11 +15,11 @@ from mav_tasks.basics.errors import RecordError
 from rover_sim.bullet import NO_PYBULLET, has_pybullet
 from rover_sim.demo import fast as virtual
 from rover_sim.demo import real
-from rover_sim.demo.processes import DemoError
 from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import problems
 from rover_sim.errors import MissingExtra
 from rover_sim.observing.picture import draw
+from rover_sim.testing.processes import ProcessFailed
 
 PICTURE = "track.png"
 USAGE = 2
@@ -78,7 +78,7 @@ def demo(
             wrong = gateways.drive(screen, body=kind)
         else:
             wrong = _run(screen, output, how, fast=fast, gui=gui, web=web)
-    except (DemoError, MissingExtra, RecordError) as error:
+    except (ProcessFailed, MissingExtra, RecordError) as error:
         screen.say(f"demo: {error}")
         raise typer.Exit(USAGE) from error
     screen.say(f"demo: {wrong} wrong" if wrong else "demo: all correct")

@@ -15,9 +15,9 @@ from mav_tasks.basics.errors import MavTasksError, NoAnswer
 from mav_tasks.client.sync import SyncClient, SyncTask
 from mav_tasks.kinds import Move
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
-from rover_sim.demo.processes import DemoError, free_ports, module, until
 from rover_sim.demo.screen import Screen
 from rover_sim.postgres import PostgresServer, installed
+from rover_sim.testing.processes import ProcessFailed, free_ports, module, until
 
 GATEWAYS = ("north", "south")
 ROVERS = 4
@@ -28,14 +28,14 @@ LIMIT = 120.0  # s, for each part
 
 
 def drive(screen: Screen, *, body: str) -> int:
-    """Show it; return how much went wrong. Raise DemoError if it cannot be run."""
+    """Show it; return how much went wrong. Raise ProcessFailed if it cannot be run."""
     try:
         with ExitStack() as ends:
             return _drive(screen, ends, body=body)
     except ModuleNotFoundError as error:
-        raise DemoError(f"--fleet needs a PostgreSQL: {error}") from error
+        raise ProcessFailed(f"--fleet needs a PostgreSQL: {error}") from error
     except (OSError, MavTasksError) as error:
-        raise DemoError(str(error)) from error
+        raise ProcessFailed(str(error)) from error
 
 
 def _drive(screen: Screen, ends: ExitStack, *, body: str) -> int:

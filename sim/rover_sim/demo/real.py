@@ -14,14 +14,13 @@ from pathlib import Path
 from mav_tasks.links.link_limits import TO_CLIENTS
 from mav_tasks.links.url import parse_url
 from rover_sim.demo.fast import follow
-from rover_sim.demo.processes import LOOK, Process, free_ports, module
 from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import ThirdParty
 from rover_sim.observing.observer import Observer
 from rover_sim.observing.track import Track
 from rover_sim.observing.truth import from_file
+from rover_sim.testing.processes import LOOK, Process, free_ports, module
 
-STARTS_WITHIN = 20.0  # s
 PAGE_PORT = 8560  # the page's usual one
 
 
@@ -60,10 +59,10 @@ def drive(
             port = PAGE_PORT if _is_free(PAGE_PORT) else 0
             text = f"web --server {server} --listen 127.0.0.1:{port} --store"
             page = start("mav_tasks.cli", text, store, "--keys", str(keys))
-            url = page.said(r"web page: (\S+)", within=STARTS_WITHIN)[1]
+            url = page.said(r"web page: (\S+)")[1]
             screen.say(f"web page: {url}")
             _open_browser(url)
-        rover.said(" on udp", within=STARTS_WITHIN)
+        rover.said(" on udp")
         found = asyncio.run(_watch(screen, server, Path(truth), running))
         if web:
             screen.say("the rover, the server and the page go on: press Ctrl-C to end them")
