@@ -43,33 +43,15 @@ class Options(NamedTuple):
     write: bool = False  # missions, fences, rally points; the previous ones are restored
 
 
-@dataclass(frozen=True, slots=True)
-class Make:
-    """What differs between the makes, beyond what a driver needs."""
-
-    nonsense: int  # a mode that does not exist
-    is_px4: bool  # as PX4 1.17: accepts it and changes nothing; integers by bytes; IN_AIR if armed
-    own_id: str  # parameters of which one shows the system id
-    needed: str = ""  # parameters without which QGroundControl asks for setup when it connects
-
-
+NONSENSE = 99  # a mode that does not exist; of PX4 a main mode
+OWN_ID = "SYSID_THISMAV MAV_SYSID MAV_SYS_ID"  # parameters of which one shows the system id
 RC_LIMITS = [f"RC{n}_{limit}" for n in range(1, 5) for limit in ("MIN", "MAX", "TRIM")]
-MAKES = {
-    "ardupilot": Make(
-        99,
-        is_px4=False,
-        own_id="SYSID_THISMAV MAV_SYSID",
-        needed="RCMAP_ROLL RCMAP_PITCH RCMAP_THROTTLE RCMAP_YAW FRAME_CLASS COMPASS_DEV_ID "
-        "COMPASS_DEV_ID2 COMPASS_DEV_ID3 INS_ACCOFFS_X INS_ACCOFFS_Y INS_ACCOFFS_Z "
-        + " ".join(RC_LIMITS),
-    ),
-    "px4": Make(
-        99 << 16,
-        is_px4=True,
-        own_id="MAV_SYS_ID",
-        needed="SYS_AUTOSTART COM_RC_IN_MODE CAL_GYRO0_ID CAL_ACC0_ID SYS_HAS_MAG _HASH_CHECK",
-    ),
-    "generic": Make(99 << 16, is_px4=True, own_id="MAV_SYS_ID"),
+#: parameters without which QGroundControl asks for setup when it connects, by make
+NEEDED = {
+    "ardupilot": "RCMAP_ROLL RCMAP_PITCH RCMAP_THROTTLE RCMAP_YAW FRAME_CLASS COMPASS_DEV_ID "
+    "COMPASS_DEV_ID2 COMPASS_DEV_ID3 INS_ACCOFFS_X INS_ACCOFFS_Y INS_ACCOFFS_Z "
+    + " ".join(RC_LIMITS),
+    "px4": "SYS_AUTOSTART COM_RC_IN_MODE CAL_GYRO0_ID CAL_ACC0_ID SYS_HAS_MAG _HASH_CHECK",
 }
 
 
@@ -108,8 +90,9 @@ class Rover:
     options: Options
 
     @property
-    def _make(self) -> Make:
-        return MAKES[self.driver.make.name]
+    def _is_px4(self) -> bool:
+        """Whether, as PX4 1.17, it has integers by bytes, IN_AIR if armed, and accepts any mode."""
+        return self.driver.make.is_px4
 
     @property
     def _target(self) -> tuple[int, int]:
@@ -248,25 +231,25 @@ class Rover:
 
     async def encoding(self) -> Seen:
         """Read the system id out of its parameter."""
-        listed, names = self._parameters(), self._make.own_id.split()
-        own = next((listed[name] for name in names if name in listed), None)
+        listed = self._parameters()
+        own = next((listed[name] for name in OWN_ID.split() if name in listed), None)
         if own is None:
-            return Seen(None, f"no {self._make.own_id}")
+            return Seen(None, f"no {OWN_ID}")
         value = own.param_value
-        if self._make.is_px4 and own.param_type != REAL32:
+        if self._is_px4 and own.param_type != REAL32:
             (value,) = unpack("<i", pack("<f", value))
         return Seen(value == self.observer.system, f"{own.param_id} {value!r}")
 
     async def needed(self) -> Seen:
         """Look for what QGroundControl needs; a checksum of the list is not in it."""
-        needed = self._make.needed.split()
-        missing = [name for name in needed if name not in self._parameters()]
+        needed = NEEDED.get(self.driver.make.name, "")
+        missing = [name for name in needed.split() if name not in self._parameters()]
         missing = [name for name in missing if await self._read(name) is None]
         return Seen(not missing, f"missing: {missing}")
 
     async def plan(self, kind: str) -> Seen:
         """Download a plan; with ``write`` upload another one, compare, clear and restore."""
-        first = int(kind == "0" and not self._make.is_px4)  # before it is home
+        first = int(kind == "0" and not self._is_px4)  # before it is home
         place = await self._last("GLOBAL_POSITION_INT")
         around = (0, 0) if place is None else (place.lat, place.lon)
         may_write = self.options.write
@@ -284,7 +267,7 @@ class Rover:
             return Seen(None, "it is armed: changing its mode could move it")
         before, mode = driver.mode, getattr(driver.make, name)
         try:
-            if driver.make.in_parts and name == "control":
+            if driver.make.is_px4 and name == "control":
                 await driver.zeros(1.0)
             answer = await driver.set_mode(mode)
             shown = await self.observer.until(lambda: driver.mode == mode, SHOWN_WITHIN)
@@ -296,9 +279,9 @@ class Rover:
     async def nonsense(self) -> Seen:
         """Ask for a mode that does not exist."""
         before = self.driver.mode
-        answer = await self.driver.set_mode(self._make.nonsense)
+        answer = await self.driver.set_mode(NONSENSE << 16 if self._is_px4 else NONSENSE)
         await self.observer.wait("HEARTBEAT", SHOWN_WITHIN)
-        right = answer.is_refused or (answer.is_accepted and self._make.is_px4)
+        right = answer.is_refused or (answer.is_accepted and self._is_px4)
         words = f"{answer}, mode {self.driver.mode:#x}"
         return Seen(right and self.driver.mode == before, words)
 
@@ -323,7 +306,7 @@ class Rover:
         def shown() -> bool:
             state = self.observer.message("EXTENDED_SYS_STATE")
             flies = state is not None and state.landed_state == IN_AIR
-            return driver.is_armed and (flies or not self._make.is_px4)
+            return driver.is_armed and (flies or not self._is_px4)
 
         try:
             end, answer = self.observer.now + ARMED_WITHIN, await driver.arm()

@@ -122,7 +122,7 @@ def _start(trace: Trace) -> Named:
     arming = [each for each in trace.answers if each.command == mav.MAV_CMD_COMPONENT_ARM_DISARM]
     accepted = next(each for each in arming if each.is_accepted)
     yield "arming accepted", accepted.asked_at + accepted.took - began
-    if not trace.make.by_course:
+    if not trace.make.is_px4:
         asked = [each for each in trace.answers if each.command == mav.MAV_CMD_DO_SET_MODE]
         guided = [each for each in asked if each.params[1] == GUIDED and each.is_accepted]
         yield "GUIDED accepted", guided[0].asked_at - began
@@ -167,9 +167,7 @@ def _motion(trace: Trace, mark: str) -> Named:
     start = trace.set_points_ended if is_silent else span.begin
     first, late = poses[0], poses[int(len(poses) * STEADY_FROM) :]
     # PX4 follows a velocity over ground: its speed along the first heading
-    along = [
-        p.speed * (math.cos(p.yaw - first.yaw) if trace.make.by_course else 1.0) for p in poses
-    ]
+    along = [p.speed * (math.cos(p.yaw - first.yaw) if trace.make.is_px4 else 1.0) for p in poses]
     yield "speed at the start", first.speed
     yield "steady speed", statistics.median(along[-len(late) :])
     ended = [pose.speed for pose in poses if pose.time > span.end - 1.0]

@@ -123,7 +123,7 @@ class Drive:
         """Try to arm until it arms, then disarm, in the mode that follows setpoints."""
         driver = self.driver
         await asyncio.sleep(FIRST_HEARTBEAT)
-        in_control = driver.make.by_course  # PX4 needs a stream before OFFBOARD
+        in_control = driver.make.is_px4  # PX4 needs a stream before OFFBOARD
         while not driver.is_armed:
             in_control = in_control or (await driver.take_control()).is_accepted
             await driver.hold()

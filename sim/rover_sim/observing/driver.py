@@ -5,7 +5,7 @@ armed, it is in the mode that follows setpoints, and it is near the place where 
 """
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, hypot, inf, isfinite, sin
 
 from pymavlink.dialects.v20 import development as mav
@@ -32,13 +32,14 @@ class Autopilot:
     name: str
     hold: int  # HEARTBEAT.custom_mode
     control: int  # the mode that follows setpoints: GUIDED, OFFBOARD
-    in_parts: bool  # DO_SET_MODE has main and sub mode; and setpoints come before the mode
-    by_course: bool  # follows a velocity over ground; else speed ahead and a yaw rate
+    #: speaks as PX4 does: DO_SET_MODE has main and sub mode, setpoints come before the mode, and it
+    #: follows a velocity over ground; else speed ahead and a yaw rate
+    is_px4: bool
 
 
-ARDUPILOT = Autopilot("ardupilot", 4, 15, in_parts=False, by_course=False)
-PX4 = Autopilot("px4", 4 << 16 | 3 << 24, 6 << 16, in_parts=True, by_course=True)
-GENERIC = Autopilot("generic", PX4.hold, PX4.control, in_parts=True, by_course=True)
+ARDUPILOT = Autopilot("ardupilot", 4, 15, is_px4=False)
+PX4 = Autopilot("px4", 4 << 16 | 3 << 24, 6 << 16, is_px4=True)
+GENERIC = replace(PX4, name="generic")
 AUTOPILOTS = {mav.MAV_AUTOPILOT_ARDUPILOTMEGA: ARDUPILOT, mav.MAV_AUTOPILOT_PX4: PX4}
 
 
@@ -90,7 +91,7 @@ class Driver:
 
     async def set_mode(self, mode: int) -> Answer:
         """Ask for a mode."""
-        parts = (mode >> 16 & 0xFF, mode >> 24) if self.make.in_parts else (mode,)
+        parts = (mode >> 16 & 0xFF, mode >> 24) if self.make.is_px4 else (mode,)
         return await self.observer.command(mav.MAV_CMD_DO_SET_MODE, CUSTOM_MODE, *parts)
 
     async def hold(self) -> Answer:
@@ -117,7 +118,7 @@ class Driver:
             if self.is_ready:
                 return True
             if not self.is_armed:
-                if self.make.in_parts:
+                if self.make.is_px4:
                     await self.hold()
                 else:
                     # zeros replace an old setpoint, which an ArduPilot would drive when it is armed
@@ -145,7 +146,7 @@ class Driver:
 
     async def zeros(self, seconds: float) -> None:
         """Stream zero velocity."""
-        await self.stream(PRESS_ON if self._keeps_course and self.make.by_course else 0.0, seconds)
+        await self.stream(PRESS_ON if self._keeps_course and self.make.is_px4 else 0.0, seconds)
 
     async def stream(
         self,
@@ -161,7 +162,7 @@ class Driver:
         ``frame``: another MAV_FRAME than the one that the make follows. Raise Interference.
         """
         begin, course = self.observer.now, self.place.yaw + aside if len(self.told) else aside
-        by_course = self.make.by_course if frame is None else frame == mav.MAV_FRAME_LOCAL_NED
+        by_course = self.make.is_px4 if frame is None else frame == mav.MAV_FRAME_LOCAL_NED
         for step in range(max(1, round(seconds / PERIOD))):
             if abs(speed) > PRESS_ON or yaw_rate:
                 self._guard()
