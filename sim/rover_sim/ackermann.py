@@ -4,11 +4,11 @@ It cannot turn on the spot: at zero speed a yaw rate turns its front wheels at m
 """
 
 import math
-from random import Random
 
 from rover_sim.body import Pose
 from rover_sim.frames import SERVO_RATE, TURN_RADIUS, WHEEL_BASE
-from rover_sim.planar import LAG_SPREAD, PlanarBody
+from rover_sim.motion import clipped
+from rover_sim.planar import PlanarBody
 
 MAX_STEERING = math.atan(WHEEL_BASE / TURN_RADIUS)  # rad, 24 degrees
 LAG = 0.02  # s, body behind wheels; the drive train has the larger lags
@@ -22,11 +22,9 @@ class AckermannBody(PlanarBody):
     """
 
     def __init__(self, *, start: Pose, seed: int | None) -> None:
-        variation = Random(seed) if seed is not None else None
-        lag = LAG * variation.uniform(*LAG_SPREAD) if variation else LAG
-        super().__init__(start=start, lag=lag)
+        super().__init__(start=start, lag=LAG, seed=seed)
         # rad; a linkage that is off by half a degree bends a path of 10 m by 1 m
-        self._off_centre = math.radians(variation.uniform(-0.3, 0.3)) if variation else 0.0
+        self._off_centre = math.radians(self._varied(0.3))
         self._steering = self._demanded_steering = 0.0
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
@@ -35,8 +33,7 @@ class AckermannBody(PlanarBody):
         self._demanded_steering = steering_for(forward_speed, yaw_rate, self._demanded_steering)
 
     def _next_yaw_rate(self, speed: float, dt: float) -> float:
-        change, most = self._demanded_steering - self._steering, SERVO_RATE * dt
-        self._steering += max(-most, min(most, change))
+        self._steering += clipped(self._demanded_steering - self._steering, SERVO_RATE * dt)
         return speed * math.tan(self._steering + self._off_centre) / WHEEL_BASE
 
 
@@ -47,5 +44,4 @@ def steering_for(forward_speed: float, yaw_rate: float, present: float) -> float
     """
     if abs(forward_speed) < ROLLING:
         return present
-    angle = math.atan(WHEEL_BASE * yaw_rate / forward_speed)
-    return max(-MAX_STEERING, min(MAX_STEERING, angle))
+    return clipped(math.atan(WHEEL_BASE * yaw_rate / forward_speed), MAX_STEERING)

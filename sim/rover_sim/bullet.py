@@ -19,10 +19,11 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from rover_sim.body import BodyState, Pose, wrap_angle
+from rover_sim.body import BodyState, Pose, turned, wrap_angle
 from rover_sim.bullet_wheels import Wheels
 from rover_sim.errors import MissingExtra
 from rover_sim.frames import Frame
+from rover_sim.motion import clipped
 
 REMEDY = "pip install pybullet numpy; its wheels are for Python 3.11 at most, on Linux x86-64"
 #: the text for a kinematic body that replaces the pybullet one
@@ -93,17 +94,17 @@ class BulletBody:
         (vx, vy, _), (_, _, wz) = p.getBaseVelocity(rover, client)
         # pybullet is x north, y west, z up; body axes forward, left, up.
         heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        cos, sin = math.cos(heading), math.sin(heading)
+        forward, left = turned(vx, vy, -heading)
         return BodyState(
             time=self._time,
             north=x,
             east=-y,
             down=RIDE_HEIGHT - z,
             yaw=-heading,
-            pitch=-math.asin(max(-1.0, min(1.0, 2.0 * (qw * qy - qz * qx)))),
+            pitch=-math.asin(clipped(2.0 * (qw * qy - qz * qx), 1.0)),
             roll=math.atan2(2.0 * (qw * qx + qy * qz), 1.0 - 2.0 * (qx * qx + qy * qy)),
-            forward_speed=vx * cos + vy * sin,
-            lateral_speed=vx * sin - vy * cos,
+            forward_speed=forward,
+            lateral_speed=-left,
             yaw_rate=-wz,
         )
 

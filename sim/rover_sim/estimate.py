@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from rover_sim.body import BodyState, wrap_angle
+from rover_sim.body import BodyState, turned, wrap_angle
 from rover_sim.faults import Faults
 
 
@@ -40,12 +40,10 @@ def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Es
     if faults.position_frozen and last is not None:
         north, east, down, vn, ve = last.north, last.east, last.down, last.vn, last.ve
     else:
-        cos, sin = math.cos(truth.yaw), math.sin(truth.yaw)
         north = truth.north + faults.position_jump[0]
         east = truth.east + faults.position_jump[1]
         down = truth.down
-        vn = truth.forward_speed * cos - truth.lateral_speed * sin
-        ve = truth.forward_speed * sin + truth.lateral_speed * cos
+        vn, ve = turned(truth.forward_speed, truth.lateral_speed, truth.yaw)
     yaw, yaw_rate = wrap_angle(truth.yaw + faults.heading_error), truth.yaw_rate
     if faults.heading_frozen and last is not None:
         yaw, yaw_rate = last.yaw, 0.0

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from itertools import repeat
 from random import Random
 
-from rover_sim.body import BodyState, wrap_angle
+from rover_sim.body import BodyState, turned, wrap_angle
 from rover_sim.motion import CONTROL_PERIOD, toward
 from rover_sim.realism import EstimatorError, PushingError, Wander
 
@@ -75,20 +75,14 @@ class Estimator:
             NO_ERROR if self._upset is None else self._upset.step(truth, asked=asked)
         )
         error = next(self._yaw) + more_yaw
-        cos, sin = math.cos(error), math.sin(error)
-        forward = truth.forward_speed * cos + truth.lateral_speed * sin + more_forward
-        lateral = truth.lateral_speed * cos - truth.forward_speed * sin + more_right
-        return BodyState(
-            truth.time,
-            truth.north + next(self._north) + next(self._drift_north),
-            truth.east + next(self._east) + next(self._drift_east),
-            truth.down,
-            wrap_angle(truth.yaw + error),
-            truth.pitch,
-            truth.roll,
-            forward + next(self._forward),
-            lateral + next(self._right),
-            truth.yaw_rate + next(self._yaw_rate),
+        forward, lateral = turned(truth.forward_speed, truth.lateral_speed, -error)
+        return truth._replace(
+            north=truth.north + next(self._north) + next(self._drift_north),
+            east=truth.east + next(self._east) + next(self._drift_east),
+            yaw=wrap_angle(truth.yaw + error),
+            forward_speed=forward + more_forward + next(self._forward),
+            lateral_speed=lateral + more_right + next(self._right),
+            yaw_rate=truth.yaw_rate + next(self._yaw_rate),
         )
 
 

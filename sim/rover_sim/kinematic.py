@@ -3,10 +3,8 @@
 For fast tests, and for Python versions that have no pybullet wheel.
 """
 
-from random import Random
-
 from rover_sim.body import Pose
-from rover_sim.planar import LAG_SPREAD, PlanarBody, approach
+from rover_sim.planar import PlanarBody, approach
 
 LAG = 0.08  # s, first-order lag from wheel-speed demand to motion
 MAX_YAW_ACCELERATION = 12.0  # rad/s²
@@ -23,11 +21,8 @@ class KinematicBody(PlanarBody):
     def __init__(self, *, start: Pose, slip: float, seed: int | None) -> None:
         if not 0.0 <= slip < 1.0:
             raise ValueError(f"slip must be in [0, 1), not {slip}")
-        variation = Random(seed) if seed is not None else None
-        lag = LAG * variation.uniform(*LAG_SPREAD) if variation else LAG
-        super().__init__(start=start, lag=lag)
-        spread = variation.uniform(-SLIP_SPREAD, SLIP_SPREAD) if variation else 0.0
-        self._grip = 1.0 - min(slip * (1.0 + spread), 0.95)
+        super().__init__(start=start, lag=LAG, seed=seed)
+        self._grip = 1.0 - min(slip * (1.0 + self._varied(SLIP_SPREAD)), 0.95)
         self._demanded_yaw_rate = 0.0
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:

@@ -5,12 +5,14 @@ It has no mass and no tyres, and is always level; tests of effects that depend o
 """
 
 import math
+from random import Random
 
 from rover_sim.body import BodyState, Pose, wrap_angle
+from rover_sim.motion import clipped
 
 MAX_ACCELERATION = 6.0  # m/s², the limit of tyres on dry ground
 SNAP = 1e-3  # m/s, rad/s; a smaller difference counts as reached
-LAG_SPREAD = 0.8, 1.2  # factors on the lag; a seed draws between them
+LAG_SPREAD = 0.2  # of the lag; a seed changes it by up to this, either way
 LONGEST_STEP = 0.05  # s; a longer advance is cut into equal parts
 STANDING = (0.0,) * 5  # pitch, roll, and motion
 
@@ -21,8 +23,10 @@ class PlanarBody:
     ``lag`` in s, from demand to motion.
     """
 
-    def __init__(self, *, start: Pose, lag: float) -> None:
-        self.lag = lag
+    def __init__(self, *, start: Pose, lag: float, seed: int | None) -> None:
+        """``seed`` varies the body between rovers; None varies nothing."""
+        self._chance = None if seed is None else Random(seed)
+        self.lag = lag * (1.0 + self._varied(LAG_SPREAD))
         #: the state after the last ``advance``
         self.state = BodyState(0.0, start.north, start.east, 0.0, wrap_angle(start.yaw), *STANDING)
         self._demanded_speed = 0.0
@@ -38,6 +42,9 @@ class PlanarBody:
 
     def close(self) -> None:
         """Do nothing: the body holds no resources."""
+
+    def _varied(self, most: float) -> float:
+        return self._chance.uniform(-most, most) if self._chance else 0.0
 
     def _next_yaw_rate(self, speed: float, dt: float) -> float:
         """Return the yaw rate after ``dt`` seconds, for a rover that then drives at ``speed``."""
@@ -67,4 +74,4 @@ def approach(value: float, target: float, lag: float, limit: float, dt: float) -
     if abs(error) < SNAP:
         return target
     change = error * (1.0 - math.exp(-dt / lag))
-    return value + max(-limit * dt, min(limit * dt, change))
+    return value + clipped(change, limit * dt)

@@ -177,7 +177,7 @@ class Px4Flight(Flight):
     def hold(self) -> Demand:
         """Return the demand to the place of DO_REPOSITION, or back to where HOLD began."""
         if self._held_at is None:
-            self._held_at = Destination(self.on.estimate.north, self.on.estimate.east)
+            self._held_at = self._here
         demand = self._drive_to(self.hold_destination or self._held_at)
         if demand is None and self.hold_destination is not None:
             self._held_at, self.hold_destination = self.hold_destination, None

@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from mav_tasks.mavlink.enums import MavFrame
-from rover_sim.body import wrap_angle
+from rover_sim.body import turned, wrap_angle
 from rover_sim.estimate import Estimate
 from rover_sim.geo import Origin
 from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
@@ -57,8 +57,7 @@ def read_px4(
             rate = message.yaw_rate
             if yaw_rate and not mask & YAW_RATE_IGNORED and math.isfinite(rate):
                 return Setpoint(TurnRate(rate, forward))
-            cos, sin = math.cos(estimate.yaw), math.sin(estimate.yaw)
-            velocity = (forward * cos - right * sin, forward * sin + right * cos, down)
+            velocity = (*turned(forward, right, estimate.yaw), down)
     else:
         return f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {frame} unsupported"
     if acceleration != NOTHING and mask & FORCE:

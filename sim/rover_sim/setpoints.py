@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavFrame
-from rover_sim.body import wrap_angle
+from rover_sim.body import turned, wrap_angle
 from rover_sim.errors import SimulatedCrash
 from rover_sim.estimate import Estimate
 from rover_sim.geo import Origin, is_on_earth
@@ -72,13 +72,8 @@ def read_setpoint(
     _abort_on_nan(message.x, message.y)
     if frame == MavFrame.LOCAL_NED:
         return Destination(message.x, message.y)
-    if frame == MavFrame.LOCAL_OFFSET_NED:
-        return Destination(estimate.north + message.x, estimate.east + message.y)
-    cos, sin = math.cos(base_yaw), math.sin(base_yaw)
-    return Destination(
-        estimate.north + message.x * cos - message.y * sin,
-        estimate.east + message.x * sin + message.y * cos,
-    )
+    north, east = turned(message.x, message.y, base_yaw)
+    return Destination(estimate.north + north, estimate.east + east)
 
 
 def read_place(latitude_degE7: int, longitude_degE7: int, origin: Origin) -> Destination | None:
