@@ -43,57 +43,43 @@ class PlannedFault:
     lasts: float = inf  # s
 
 
-def _lasts(faults: Faults) -> Callable[[Frame], Faults]:
-    return lambda _frame: faults
-
-
-def _block_wheel(_frame: Frame, side: str) -> Faults:
-    return Faults(wheels_blocked=wheels_of(side))
-
-
-def _freeze_output(frame: Frame, name: str) -> Faults:
-    return Faults(outputs_frozen=frozenset({output_of(name, frame)}))
-
-
-def _push(_frame: Frame, metres: str, way: str) -> Event:
-    forward, right = (float(metres) * each for each in WAYS[way])
-    return lambda vehicle, _now: vehicle.push(forward, right, 0.0)
-
-
-def _turn(_frame: Frame, degrees: str, way: str) -> Event:
-    turn = radians(float(degrees) if way == "right" else -float(degrees))
-    return lambda vehicle, _now: vehicle.push(0.0, 0.0, turn)
-
-
-def _reboot(_frame: Frame) -> Event:
-    return lambda vehicle, now: vehicle.autopilot.reboot(now=now)
-
-
-def _disarm(_frame: Frame) -> Event:
-    return lambda vehicle, now: vehicle.autopilot.operator_arm(False, now=now)
+def _push(forward: float, right: float, turn: float = 0.0) -> Event:
+    return lambda vehicle, _now: vehicle.push(forward, right, turn)
 
 
 WAYS = {"forward": (1, 0), "back": (-1, 0), "left": (0, -1), "right": (0, 1)}
-#: action name: its syntax for the user, the pattern of its arguments, and what it does
+#: action name: its syntax for the user, the pattern of its arguments, and what these do on a frame
 ACTIONS: Mapping[str, tuple[str, str, Callable[..., Faults | Event]]] = {
-    "block-wheel": ("block-wheel left|right|all", "(left|right|all)", _block_wheel),
+    "block-wheel": (
+        "block-wheel left|right|all",
+        "(left|right|all)",
+        lambda _, side: Faults(wheels_blocked=wheels_of(side)),
+    ),
     "freeze-output": (
         "freeze-output left|right (ackermann: throttle|steering)",
         r"(\w+)",
-        _freeze_output,
+        lambda frame, name: Faults(outputs_frozen=frozenset({output_of(name, frame)})),
     ),
-    "lose-gps": ("lose-gps", "", _lasts(Faults(gps_lost=True))),
-    "breach-fence": ("breach-fence", "", _lasts(Faults(outside_fence=True))),
-    "freeze-position": ("freeze-position", "", _lasts(Faults(position_frozen=True))),
-    "cut-link": ("cut-link", "", _lasts(Faults(silent=True, deaf=True))),
+    "lose-gps": ("lose-gps", "", lambda _: Faults(gps_lost=True)),
+    "breach-fence": ("breach-fence", "", lambda _: Faults(outside_fence=True)),
+    "freeze-position": ("freeze-position", "", lambda _: Faults(position_frozen=True)),
+    "cut-link": ("cut-link", "", lambda _: Faults(silent=True, deaf=True)),
     "push": (
         "push 0.5 m forward|back|left|right",
         rf"({NUMBER}) ?m ({'|'.join(WAYS)})",
-        _push,
+        lambda _, metres, way: _push(*(float(metres) * each for each in WAYS[way])),
     ),
-    "turn": ("turn 30 deg right|left", rf"({NUMBER}) ?deg (right|left)", _turn),
-    "reboot": ("reboot", "", _reboot),
-    "disarm": ("disarm", "", _disarm),
+    "turn": (
+        "turn 30 deg right|left",
+        rf"({NUMBER}) ?deg (right|left)",
+        lambda _, degrees, way: _push(0.0, 0.0, radians(float(degrees)) * WAYS[way][1]),
+    ),
+    "reboot": ("reboot", "", lambda _: lambda vehicle, now: vehicle.autopilot.reboot(now=now)),
+    "disarm": (
+        "disarm",
+        "",
+        lambda _: lambda vehicle, now: vehicle.autopilot.operator_arm(False, now=now),
+    ),
 }
 HELP = (
     f"Cause a fault at the given time, for example '{EXAMPLE}'; repeatable."

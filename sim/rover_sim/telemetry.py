@@ -1,6 +1,7 @@
 """The content of each telemetry message: the flight stack's state in MAVLink fields and units."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from mav_tasks.mavlink import messages as m
@@ -27,63 +28,47 @@ TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_*
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 NONE, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = range(1, 6)  # MISSION_STATE
 NOTHING = (0,) * 8
-SENT: tuple[Any, ...] = (
-    m.Heartbeat,
-    m.SysStatus,
-    m.SystemTime,
-    m.GpsRawInt,
-    m.Attitude,
-    m.LocalPositionNed,
-    m.GlobalPositionInt,
-    m.MissionCurrent,
-    m.GpsGlobalOrigin,
-    m.VfrHud,
-    m.PositionTargetGlobalInt,
-    m.BatteryStatus,
-    m.AutopilotVersion,
-    m.HomePosition,
-    m.ExtendedSysState,
-    m.ProtocolVersion,
-    m.CurrentMode,
-    m.RcChannels,
-)
 Fields = tuple[Any, ...]
 
 
 class Telemetry:
     """Builds every message that the rover can send about itself.
 
-    The method for a message has its name; it takes the estimate, and the milliseconds since boot,
-    and returns the message's fields in their order, or None if there is nothing to send.
+    The method for a message has its name, after ``tell_``; it takes the estimate, and the
+    milliseconds since boot, and returns the message's fields in their order, or None if there is
+    nothing to send.
     """
 
     def __init__(self, on: Onboard, *, unix_offset: float) -> None:
         self._on = on
         self._flight = on.flight
         self._unix_offset = unix_offset
-        self._sent = {each.id: each for each in SENT if each.id not in on.persona.lacks}
 
     def knows(self, message_id: int) -> bool:
         """Return whether this rover can send the message."""
-        return message_id in self._sent or message_id in self._on.persona.accepted_in_silence
+        is_accepted = message_id in self._on.persona.accepted_in_silence
+        return is_accepted or self._method_of(message_id) is not None
+
+    def _method_of(self, message_id: int) -> Callable[[Estimate, int], Fields | None] | None:
+        if message_id not in m.ALL or message_id in self._on.persona.lacks:
+            return None
+        return getattr(self, f"tell_{m.ALL[message_id].msgname.lower()}", None)
 
     def build(self, message_id: int, estimate: Estimate, now: float) -> Message | None:
         """Return the present message; None if there is nothing to send."""
         boot_ms = int((now - self._on.started) * 1000.0 + 0.5)
-        kind = self._sent.get(message_id)
-        if kind is None:
-            return None
-        fields = getattr(self, f"_{kind.msgname.lower()}")(estimate, boot_ms)
+        method = self._method_of(message_id)
+        fields = None if method is None else method(estimate, boot_ms)
         if fields is None:
             return None
-        message: Message = kind(*fields)
+        message: Message = m.ALL[message_id](*fields)
         if hasattr(message, "time_boot_ms"):
             if not self._on.boot.tells_its_time(now):
                 return None
             message.time_boot_ms %= OVERFLOW
         return message
 
-    def _heartbeat(self, *_: object) -> Fields:
+    def tell_heartbeat(self, *_: object) -> Fields:
         flight, persona = self._flight, self._on.persona
         armed = MavModeFlag.SAFETY_ARMED if flight.armed else 0
         return (
@@ -95,7 +80,7 @@ class Telemetry:
             MAVLINK_VERSION,
         )
 
-    def _sys_status(self, _estimate: Estimate, boot_ms: int) -> Fields:
+    def tell_sys_status(self, _estimate: Estimate, boot_ms: int) -> Fields:
         persona, faults = self._on.persona, self._on.outbox.faults
         present = SENSORS if persona.enables_prearm else SENSORS & ~PREARM
         healthy = present | persona.also_healthy | PREARM
@@ -104,42 +89,29 @@ class Telemetry:
         enabled = present
         if faults.outside_fence and persona.also_healthy & GEOFENCE:
             enabled, healthy = enabled | GEOFENCE, healthy & ~GEOFENCE
-        return (
-            present,
-            enabled,
-            healthy,
-            100,
-            12600,
-            500,
-            faults.battery,
-            0,
-            0,
-            0,
-            0,
-            0,
-            0,
-        )  # load 10 %, 12.6 V, 5 A
+        # load 10 %, 12.6 V, 5 A
+        return present, enabled, healthy, 100, 12600, 500, faults.battery, *(0,) * 6
 
-    def _extended_sys_state(self, *_: object) -> Fields:
+    def tell_extended_sys_state(self, *_: object) -> Fields:
         armed, disarmed = self._on.persona.landed_states
         return 0, armed if self._flight.armed else disarmed
 
-    def _system_time(self, _estimate: Estimate, boot_ms: int) -> Fields:
+    def tell_system_time(self, _estimate: Estimate, boot_ms: int) -> Fields:
         unix = self._unix_offset + self._on.started + boot_ms * 1e-3 if self._unix_offset else 0.0
         return int(unix * 1e6), boot_ms
 
-    def _attitude(self, estimate: Estimate, boot_ms: int) -> Fields:
+    def tell_attitude(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, has_heading = estimate, self._is_over("heading", boot_ms)
         yaw = e.yaw if has_heading else 0.0
         return boot_ms, e.roll, e.pitch, yaw, 0.0, 0.0, e.yaw_rate
 
-    def _local_position_ned(self, estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_local_position_ned(self, estimate: Estimate, boot_ms: int) -> Fields | None:
         if not self._is_over("position", boot_ms):
             return None
         e = estimate
         return boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0
 
-    def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Fields:
+    def tell_global_position_int(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, heading = estimate, _centidegrees(estimate.yaw)
         if not self._is_over("position", boot_ms):
             return boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading
@@ -147,7 +119,7 @@ class Telemetry:
         velocity = (_cm(e.vn), _cm(e.ve), 0)
         return boot_ms, *place, self._altitude(e), round(-e.down * 1e3), *velocity, heading
 
-    def _gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Fields:
+    def tell_gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Fields:
         e, time_us = estimate, boot_ms * 1000
         has_fix = self._is_over("fix", boot_ms)
         if self._on.outbox.faults.gps_lost or not has_fix:
@@ -160,14 +132,14 @@ class Telemetry:
     def _altitude(self, estimate: Estimate) -> int:
         return round((self._on.origin.altitude - estimate.down) * 1e3)
 
-    def _vfr_hud(self, estimate: Estimate, _boot_ms: int) -> Fields:
+    def tell_vfr_hud(self, estimate: Estimate, _boot_ms: int) -> Fields:
         speed = estimate.ground_speed
         throttle = min(100, round(abs(estimate.forward_speed) * 20)) if self._flight.armed else 0
         heading = _centidegrees(estimate.yaw) // 100
         altitude = self._on.origin.altitude - estimate.down
         return speed, speed, heading, throttle, altitude, 0.0
 
-    def _home_position(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_home_position(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         if not self._is_over("position", boot_ms):
             return None
         north, east = self._flight.home
@@ -177,14 +149,14 @@ class Telemetry:
             altitude, local = NO_ALTITUDE, (math.nan,) * 3
         return *place, altitude, *local, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000
 
-    def _gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         on = self._on
         if not (on.realism.tells_origin and self._is_over("origin", boot_ms)):
             return None
         altitude = round(on.origin.altitude * 1e3)
         return *on.origin.in_degrees_e7, altitude, boot_ms * 1000
 
-    def _rc_channels(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_rc_channels(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         sticks = self._on.sticks
         if not sticks.is_there:
             return None
@@ -198,13 +170,13 @@ class Telemetry:
         """Return the time that the message says."""
         return self._on.started + boot_ms * 1e-3
 
-    def _battery_status(self, *_: object) -> Fields:
+    def tell_battery_status(self, *_: object) -> Fields:
         return 0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100
 
-    def _protocol_version(self, *_: object) -> Fields:
+    def tell_protocol_version(self, *_: object) -> Fields:
         return 200, 100, 200, NOTHING, NOTHING  # MAVLink 2, minimum 1
 
-    def _autopilot_version(self, *_: object) -> Fields:
+    def tell_autopilot_version(self, *_: object) -> Fields:
         persona = self._on.persona
         return (
             persona.capabilities,
@@ -217,7 +189,7 @@ class Telemetry:
             self._on.uid,
         )
 
-    def _mission_current(self, *_: object) -> Fields:
+    def tell_mission_current(self, *_: object) -> Fields:
         flight, missions = self._flight, self._on.missions
         total = missions.item_count
         if total == 0:
@@ -236,7 +208,7 @@ class Telemetry:
             *map(missions.plan_id, (MISSION, FENCE, RALLY)),
         )
 
-    def _position_target_global_int(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_position_target_global_int(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
         destination, origin = self._flight.destination, self._on.origin
         if destination is None:
             return None
@@ -245,7 +217,7 @@ class Telemetry:
             return None  # a local place far beyond the Earth's coordinates
         return boot_ms, 5, TARGET_POSITION_ONLY, *place, origin.altitude, *NOTHING
 
-    def _current_mode(self, *_: object) -> Fields:
+    def tell_current_mode(self, *_: object) -> Fields:
         flight, persona = self._flight, self._on.persona
         offered, numbers = persona.offered_modes, persona.modes.numbers
         standard = next((each.standard for each in offered if each.mode is flight.mode), 0)

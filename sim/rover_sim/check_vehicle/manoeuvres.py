@@ -1,7 +1,8 @@
 """The manoeuvres in which the real autopilots were recorded, and what is kept of a drive.
 
-manoeuvres.csv has them: a mark, what is done (a method of ``Drive``), with which numbers (m/s, s,
-deg/s, deg), and the only make that does it. A row without a mark goes on with the one before.
+manoeuvres.csv has them: a mark, what is done (a method of ``Drive`` or ``Driver``), with which
+numbers (m/s, s, deg/s, deg), and the only make that does it. A row without a mark goes on with the
+one before.
 """
 
 import asyncio
@@ -95,7 +96,7 @@ class Drive:
                 self._mark(mark)
             if mark.startswith("set-points end"):
                 ended = driver.last_setpoint_at
-            await getattr(self, do)(*map(float, numbers.split()))
+            await getattr(self, do, getattr(driver, do, None))(*map(float, numbers.split()))
         asking.cancel()
         heard: dict[str, list[Heard]] = {}
         for each in observer.log:
@@ -151,14 +152,6 @@ class Drive:
     async def stream(self, speed: float, seconds: float, rate: float = 0, aside: float = 0) -> None:
         """Stream a velocity; a PX4 rover gets one that turns at the rate."""
         await self.driver.stream(speed, seconds, yaw_rate=radians(rate), aside=radians(aside))
-
-    async def zeros(self, seconds: float) -> None:
-        """Stream zero velocity."""
-        await self.driver.zeros(seconds)
-
-    async def hold(self) -> None:
-        """Ask for HOLD."""
-        await self.driver.hold()
 
     async def disarm(self) -> None:
         """Disarm it."""

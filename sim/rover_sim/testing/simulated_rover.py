@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import degrees
+from typing import Any
 
 from rover_sim.actuators import output_of, wheels_of
 from rover_sim.body import Pose
@@ -100,12 +101,11 @@ class SimulatedRover:
 
         Raise ValueError for any other side.
         """
-        faults = self._autopilot.faults
-        self.set_faults(replace(faults, wheels_blocked=faults.wheels_blocked | wheels_of(side)))
+        self._change(wheels_blocked=self._autopilot.faults.wheels_blocked | wheels_of(side))
 
     def free_wheels(self) -> None:
         """Release the wheels."""
-        self.set_faults(replace(self._autopilot.faults, wheels_blocked=frozenset()))
+        self._change(wheels_blocked=frozenset())
 
     def freeze_output(self, name: str) -> None:
         """Freeze an output at its present value while the rover is armed, in any mode.
@@ -114,12 +114,11 @@ class SimulatedRover:
         others.
         """
         frozen = {output_of(name, self._persona.frame)}
-        faults = self._autopilot.faults
-        self.set_faults(replace(faults, outputs_frozen=faults.outputs_frozen | frozen))
+        self._change(outputs_frozen=self._autopilot.faults.outputs_frozen | frozen)
 
     def lose_gps(self) -> None:
         """Remove all satellites: after some seconds of driving, the position is lost."""
-        self.set_faults(replace(self._autopilot.faults, gps_lost=True))
+        self._change(gps_lost=True)
 
     def arm(self) -> None:
         """Arm the rover locally, without a MAVLink command."""
@@ -150,3 +149,6 @@ class SimulatedRover:
     def set_faults(self, faults: Faults) -> None:
         """Replace the faults; ``Faults()`` clears them all."""
         self._autopilot.set_faults(faults)
+
+    def _change(self, **changes: Any) -> None:
+        self.set_faults(replace(self._autopilot.faults, **changes))

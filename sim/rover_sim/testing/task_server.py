@@ -3,7 +3,9 @@
 A test can kill and restart it; acknowledged tasks survive, as on a disk.
 """
 
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -130,15 +132,8 @@ def stored(events: list[Event]) -> Restored:
     """Return what the real store restores from these events."""
     with TemporaryDirectory(prefix="rover-sim-") as folder:
         path = Path(folder) / "tasks.sqlite3"
-        first = SqliteStore(path, wall_offset=_no_offset, retention=FOR_EVER)
-        first.append(events)
-        first.close()
-        again = SqliteStore(path, wall_offset=_no_offset, retention=FOR_EVER)
-        try:
+        opened = partial(SqliteStore, path, wall_offset=float, retention=FOR_EVER)
+        with closing(opened()) as first:
+            first.append(events)
+        with closing(opened()) as again:
             return again.load()
-        finally:
-            again.close()
-
-
-def _no_offset() -> float:
-    return 0.0

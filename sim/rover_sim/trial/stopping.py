@@ -111,7 +111,7 @@ def lacks_stick(session: Session) -> str:
     """Return what is missing to push the stick."""
     if session.rover is not None and session.rover.kind == "px4":
         return "PX4 does not add the stick"
-    return "" if session.ground.can_push_stick else "no second link (--stick)"
+    return "" if session.ground.second else "no second link (--stick)"
 
 
 def stick(moment: Moment) -> Callable[[Session], Awaitable[Result]]:
