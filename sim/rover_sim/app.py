@@ -3,6 +3,7 @@
 This file has the command line, the socket and the signals; the loop is in ``real_time``.
 """
 
+import os
 import signal
 import socket
 import sys
@@ -10,7 +11,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
-from ipaddress import ip_address
 from math import isfinite, nan, radians
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple, NoReturn, TextIO
@@ -18,7 +18,10 @@ from typing import Annotated, Literal, NamedTuple, NoReturn, TextIO
 import typer
 from typer import BadParameter, Option
 
-from mav_tasks.basics.errors import KeyRingError
+from mav_tasks.basics.errors import KeyRingError, LinkOpenError
+from mav_tasks.links.base import Link
+from mav_tasks.links.link_limits import TO_CLIENTS
+from mav_tasks.links.udp import UdpUrl
 from mav_tasks.mavlink.signing import Key
 from rover_sim.body import Body, Pose, wrap_angle
 from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet
@@ -264,7 +267,8 @@ def sim(
             bodies = [body_of(index) for index in range(count)]
             for each in bodies:
                 stack.callback(each.close)
-            server = _open_socket(host, port, stack, is_allowed=insecure or key is not None)
+            link = _open_link(host, port, is_allowed=insecure or key is not None)
+            stack.callback(link.close)
             poses = None if truth is None else _open_truth(truth, stack)
             clock = Clock(speed)
             now = clock.now()  # one start time for all rovers, so that they wake up together
@@ -283,15 +287,16 @@ def sim(
                 )
                 for index, (number, each) in enumerate(zip(numbers, bodies, strict=True))
             ]
-            where = "{}:{}".format(*server.getsockname()[:2])
+            with socket.socket(fileno=os.dup(link.fileno())) as opened:
+                where = "{}:{}".format(*opened.getsockname()[:2])
             what = ", ".join([persona, body, *([] if frame is None else [frame.value])])
             for number, rover in zip(numbers, rovers, strict=True):
                 if sticks is not None:
                     rover.autopilot.operator_pulses(*sticks)
                 sys.stdout.write(f"rover_sim: rover {number} ({what}) on udp {where}\n")
             sys.stdout.flush()
-            drive(server, stop, rovers, clock, poses, FaultPlayer(faults, rovers))
-    except (StartError, MissingExtra) as error:
+            drive(link, stop, rovers, clock, poses, FaultPlayer(faults, rovers))
+    except (StartError, LinkOpenError, MissingExtra) as error:
         sys.stderr.write(f"rover_sim: {error}\n")
         raise typer.Exit(USAGE_ERROR) from None
     except SimulatedCrash as error:
@@ -331,24 +336,14 @@ def _stop_signals(stack: ExitStack) -> socket.socket:
     return stop
 
 
-def _open_socket(host: str, port: int, stack: ExitStack, *, is_allowed: bool) -> socket.socket:
-    try:
-        address = ip_address("127.0.0.1" if host == "localhost" else host)
-    except ValueError as error:
-        raise StartError(f"not an IP address: {host}") from error
-    if not address.is_loopback and not is_allowed:
+def _open_link(host: str, port: int, *, is_allowed: bool) -> Link:
+    url = UdpUrl("udpin", host, port)
+    if not url.is_nearby and not is_allowed:
         raise StartError(
-            f"{address} is not a loopback address and MAVLink here is not signed:"
+            f"{host} is not a loopback address and MAVLink here is not signed:"
             " use --sign NAME, or --insecure to allow that"
         )
-    family = socket.AF_INET if address.version == 4 else socket.AF_INET6
-    server = stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))
-    server.setblocking(False)
-    try:
-        server.bind((str(address), port))
-    except OSError as error:
-        raise StartError(f"udp {address}:{port}: {error.strerror}") from error
-    return server
+    return url.open(limits=TO_CLIENTS)
 
 
 def _open_truth(name: str, stack: ExitStack) -> TextIO:
