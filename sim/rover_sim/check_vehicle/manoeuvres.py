@@ -96,7 +96,7 @@ class Drive:
                 self._mark(mark)
             if mark.startswith("set-points end"):
                 ended = driver.last_setpoint_at
-            await getattr(self, do, getattr(driver, do, None))(*map(float, numbers.split()))
+            await (getattr(self, do, None) or getattr(driver, do))(*map(float, numbers.split()))
         asking.cancel()
         heard: dict[str, list[Heard]] = {}
         for each in observer.log:

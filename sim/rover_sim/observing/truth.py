@@ -64,18 +64,19 @@ def from_link(observer: Observer) -> Iterator[Track]:
 
     def take(heard: Heard) -> None:
         m = heard.message
-        if heard.name == "SIM_STATE" and m.lat_int:
-            add(heard.at, (m.lat_int, m.lon_int), m.yaw)
-        elif heard.name == "HIL_STATE_QUATERNION" and m.lat:
+        if heard.name == "SIM_STATE":
+            place, yaw = (m.lat_int, m.lon_int), m.yaw
+        elif heard.name == "HIL_STATE_QUATERNION":
             w, x, y, z = m.attitude_quaternion
-            yaw = atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-            add(heard.at, (m.lat, m.lon), yaw)
-
-    def add(at: float, place: tuple[int, int], yaw: float) -> None:
+            place, yaw = (m.lat, m.lon), atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        else:
+            return
+        if not place[0]:
+            return
         zero.append(place)
         del zero[1:]
         north, east = (radians((a - b) / 1e7) * EARTH for a, b in zip(place, zero[0], strict=True))
-        track.add(Place(at, north, east * cos(radians(zero[0][0] / 1e7)), yaw))
+        track.add(Place(heard.at, north, east * cos(radians(zero[0][0] / 1e7)), yaw))
 
     async def ask() -> None:
         while True:

@@ -4,6 +4,7 @@ from collections.abc import Awaitable, Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 from mav_tasks.basics.errors import ClientError
 from rover_sim.trial import restarts, stopping, tasks
@@ -83,7 +84,7 @@ KINDS = (
             "stick",
             f"throttle stick pushed forward, {moment.value}",
             AHEAD,
-            stopping.stick(moment),
+            partial(stopping.stick, moment),
             stopping.lacks_stick,
         )
         for moment in stopping.Moment

@@ -92,6 +92,11 @@ class Ground:
         """Whether there is a way to restart the rover."""
         return bool(self.reboot_command) or self.second is not None
 
+    @property
+    def can_push_stick(self) -> bool:
+        """Whether there is a second link."""
+        return self.second is not None
+
     async def reboot(self) -> None:
         """Restart the rover's autopilot. Raise TrialError if that is refused."""
         if self.reboot_command:

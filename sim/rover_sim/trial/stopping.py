@@ -1,7 +1,6 @@
 """Rows: STOP at 1 m/s beside the rover's own ways to stop, and the throttle stick of a person."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
 from enum import Enum
 from statistics import median
 
@@ -111,15 +110,14 @@ def lacks_stick(session: Session) -> str:
     """Return what is missing to push the stick."""
     if session.rover is not None and session.rover.kind == "px4":
         return "PX4 does not add the stick"
-    return "" if session.ground.second else "no second link (--stick)"
+    return "" if session.ground.can_push_stick else "no second link (--stick)"
 
 
-def stick(moment: Moment) -> Callable[[Session], Awaitable[Result]]:
-    """Return the row in which a person pushes the throttle stick at this moment."""
-
-    async def push(session: Session) -> Result:
-        await session.rest()
-        pushed = session.now
+async def stick(moment: Moment, session: Session) -> Result:
+    """Push the throttle stick at this moment, as a person would."""
+    await session.rest()
+    pushed = session.now
+    try:
         if moment is Moment.STARTING:
             session.ground.push_stick(FORWARD)
             await quietly(lambda: session.submit(Move(LONG)))
@@ -133,18 +131,11 @@ def stick(moment: Moment) -> Callable[[Session], Awaitable[Result]]:
             session.ground.push_stick(FORWARD)
         await asyncio.sleep(WATCHED)
         seconds, metres = session.track.stood_after(pushed), session.track.travelled(pushed)
+    finally:
         session.ground.push_stick(None)
-        await session.clean()
-        most = session.limits.stick
-        if seconds is None:
-            return Result("still moves", False, f"{metres:.2f} m", f"{most:g} s")
-        figure = f"after {seconds:.2f} s, {metres:.2f} m"
-        return Result("stands", seconds <= most, figure, f"{most:g} s")
-
-    async def pushed_and_released(session: Session) -> Result:
-        try:
-            return await push(session)
-        finally:
-            session.ground.push_stick(None)
-
-    return pushed_and_released
+    await session.clean()
+    most = session.limits.stick
+    if seconds is None:
+        return Result("still moves", False, f"{metres:.2f} m", f"{most:g} s")
+    figure = f"after {seconds:.2f} s, {metres:.2f} m"
+    return Result("stands", seconds <= most, figure, f"{most:g} s")

@@ -1,10 +1,10 @@
 """Row: thirty tasks, one after another, each measured where the rover then stands."""
 
+from cmath import rect
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import ceil, cos, degrees, hypot, radians, remainder, sin, tau
-from statistics import fmean
+from math import ceil, degrees, radians, remainder, tau
 
 from mav_tasks.client.wire import Goal
 from mav_tasks.kinds import GoTo, LocalPlace, Move, Rotate
@@ -14,7 +14,8 @@ from rover_sim.trial.session import End, Result, Session
 WITHIN = 300.0  # s for one task, at 0.5 m/s: 45 m to a mission of 30 m, and curves
 MOST_SHOWN = 4  # failures shown
 UNABLE = ("not turn", "not reverse", "cannot turn")  # in refusals of impossible tasks
-Point = tuple[float, float]  # north and east, m
+#: m north, and m east as the imaginary part: a rotation is a product, and abs() a distance
+Vector = complex
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class TrialTask:
 
     words: str
     goals: tuple[Goal, ...]
-    end: Point | None = None  # None: a turn, or unknown
+    end: Vector | None = None  # None: a turn, or unknown
     turn: float | None = None  # rad
     is_relative: bool = False  # to the rover's place at its start, as for a move
 
@@ -58,48 +59,16 @@ def task_of(words: str, now: Place, begun: Place) -> TrialTask:
     base = now if kind == "near" else begun
     pairs = zip(values[::2], values[1::2], strict=True)
     places = [_offset(base, forward, right) for forward, right in pairs]
-    return TrialTask(words, tuple(GoTo(LocalPlace(*place)) for place in places), places[-1])
+    goals = tuple(GoTo(LocalPlace(place.real, place.imag)) for place in places)
+    return TrialTask(words, goals, places[-1])
 
 
-def _offset(place: Place, forward: float, right: float) -> Point:
-    north = place.north + forward * cos(place.yaw) - right * sin(place.yaw)
-    return north, place.east + forward * sin(place.yaw) + right * cos(place.yaw)
+def _at(place: Place) -> Vector:
+    return complex(place.north, place.east)
 
 
-@dataclass(frozen=True, slots=True)
-class Driven:
-    """One completed task, in true and in reported places, before and after."""
-
-    asked: TrialTask
-    before: Place
-    after: Place
-    told: Place
-    told_after: Place
-
-    def turned_wrong(self) -> float:
-        """Return the error of a turn, degrees."""
-        wanted = self.asked.turn or 0.0
-        return degrees(abs(remainder(self.after.yaw - self.before.yaw - wanted, tau)))
-
-    def off(self, shift: tuple[float, float]) -> float:
-        """Return the error of the end, m.
-
-        A move should end at its distance from its true start, along the reported heading. A place
-        is in the rover's frame, which is shifted against the true one.
-        """
-        assert self.asked.end is not None
-        if self.asked.is_relative:
-            shift = self.before.north - self.told.north, self.before.east - self.told.east
-        return self._apart(self.after, shift)
-
-    def off_by_estimate(self) -> float:
-        """Return the error of the reported end, m: the part that the server causes."""
-        return self._apart(self.told_after, (0.0, 0.0))
-
-    def _apart(self, at: Place, shift: tuple[float, float]) -> float:
-        assert self.asked.end is not None
-        north, east = self.asked.end
-        return hypot(at.north - north - shift[0], at.east - east - shift[1])
+def _offset(place: Place, forward: float, right: float) -> Vector:
+    return _at(place) + complex(forward, right) * rect(1.0, place.yaw)
 
 
 @dataclass(slots=True)
@@ -108,17 +77,20 @@ class Tally:
 
     ends: list[tuple[TrialTask, End]] = field(default_factory=list)
     refused: int = 0
-    driven: list[Driven] = field(default_factory=list)
-    shifts: list[tuple[float, float]] = field(default_factory=list)
+    #: of each completed task with a place, the error of the true end, m, and the shift in it (None:
+    #: the mean one). A move should end at its distance from its true start, along the reported
+    #: heading; a place is in the rover's frame, which is shifted against the true one
+    driven: list[tuple[Vector, Vector | None]] = field(default_factory=list)
+    believed: list[float] = field(default_factory=list)  # cm, by the estimate: the server's part
+    angles: list[float] = field(default_factory=list)  # degrees, errors of turns
+    shifts: list[Vector] = field(default_factory=list)  # of the true frame, each measured at rest
 
-    def add_shift(self, true: Place, told: Place) -> None:
-        """Add the offset between the true and the reported frame, measured at rest."""
-        self.shifts.append((true.north - told.north, true.east - told.east))
-
-    @property
-    def shift(self) -> tuple[float, float]:
-        """The mean offset of the frames, m; averaging reduces the estimate's error in each."""
-        return fmean(north for north, _ in self.shifts), fmean(east for _, east in self.shifts)
+    def off(self) -> list[float]:
+        """Return the errors of the true ends, cm; the mean shift has less of the estimate's."""
+        mean = sum(self.shifts) / len(self.shifts)
+        return [
+            abs(error - (mean if shift is None else shift)) * 100 for error, shift in self.driven
+        ]
 
 
 async def drive_tasks(session: Session) -> Result:
@@ -126,7 +98,7 @@ async def drive_tasks(session: Session) -> Result:
     tally = Tally()
     true = await session.rest()
     begun = session.told.last
-    tally.add_shift(true, begun)
+    tally.shifts.append(_at(true) - _at(begun))
     left, instead = TASKS.split(", "), FURTHER.split(", ")
     while left:
         await _drive_one(session, left.pop(0), begun, tally)
@@ -145,19 +117,22 @@ async def _drive_one(session: Session, words: str, begun: Place, tally: Tally) -
         return
     after = await session.rest()
     tally.ends.append((asked, end))
-    tally.add_shift(after, session.told.last)
+    told_after = session.told.last
+    tally.shifts.append(_at(after) - _at(told_after))
     shown = f"  {asked.words}: {end}, {end.seconds:.1f} s"
     if not end.is_completed:
         session.say(shown)
         await session.clean()
         return
-    driven = Driven(asked, before, after, told, session.told.last)
-    tally.driven.append(driven)
     if asked.turn is not None:
-        shown += f", {driven.turned_wrong():.2f} deg off"
+        wrong = remainder(after.yaw - before.yaw - asked.turn, tau)
+        tally.angles.append(degrees(abs(wrong)))
+        shown += f", {tally.angles[-1]:.2f} deg off"
     elif asked.end is not None:
-        believed = driven.off_by_estimate() * 100
-        shown += f", {driven.off(tally.shift) * 100:.1f} cm off, {believed:.1f} by its estimate"
+        own = _at(before) - _at(told) if asked.is_relative else None
+        tally.driven.append((_at(after) - asked.end, own))
+        tally.believed.append(abs(_at(told_after) - asked.end) * 100)
+        shown += f", {tally.off()[-1]:.1f} cm off, {tally.believed[-1]:.1f} by its estimate"
     session.say(shown)
 
 
@@ -166,27 +141,24 @@ def _result(session: Session, tally: Tally) -> Result:
     states = Counter(end.state for _, end in tally.ends)
     words = ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
     words += f"; {tally.refused} refused" if tally.refused else ""
-    moved = [each for each in tally.driven if each.asked.end is not None]
-    metres = sorted(each.off(tally.shift) * 100 for each in moved)
-    believed = sorted(each.off_by_estimate() * 100 for each in moved)
-    angles = sorted(each.turned_wrong() for each in tally.driven if each.asked.turn is not None)
-    figure = f"end p50/p95/max {_three(metres)} cm, by its estimate {_three(believed)}"
+    off, angles = tally.off(), tally.angles
+    figure = f"end p50/p95/max {_three(off)} cm, by its estimate {_three(tally.believed)}"
     limit = f"p95 {limits.end * 100:g} cm"
     if angles:
         figure += f", turns {_three(angles)} deg"
         limit += f", {limits.turn:g} deg"
-    holds = len(tally.driven) == len(tally.ends) > 0
-    holds = holds and quantile(metres, 0.95) <= limits.end * 100
-    holds = holds and quantile(angles, 0.95) <= limits.turn
     wrong = [f"{asked.words}: {end}" for asked, end in tally.ends if not end.is_completed]
+    holds = bool(tally.ends) and not wrong
+    holds = holds and quantile(off, 0.95) <= limits.end * 100
+    holds = holds and quantile(angles, 0.95) <= limits.turn
     words += f" ({'; '.join(wrong[:MOST_SHOWN])})" if wrong else ""
     return Result(words, holds, figure, limit)
 
 
-def quantile(ordered: Sequence[float], share: float) -> float:
+def quantile(values: Sequence[float], share: float) -> float:
     """Return the value at or below which ``share`` of the values lie; 0 without values."""
-    return ordered[max(0, ceil(len(ordered) * share) - 1)] if ordered else 0.0
+    return sorted(values)[max(0, ceil(len(values) * share) - 1)] if values else 0.0
 
 
-def _three(ordered: Sequence[float]) -> str:
-    return "/".join(f"{quantile(ordered, share):.1f}" for share in (0.5, 0.95, 1.0))
+def _three(values: Sequence[float]) -> str:
+    return "/".join(f"{quantile(values, share):.1f}" for share in (0.5, 0.95, 1.0))
