@@ -36,7 +36,7 @@ class ArduPilotFlight(Flight):
     def __init__(self, on: Onboard) -> None:
         super().__init__(on)
         self._taken_at = 0.0
-        self._speed: float | None = None  # m/s towards a place, from DO_CHANGE_SPEED
+        self._speed = math.inf  # m/s towards a place, from DO_CHANGE_SPEED
         self._heard: float | None = None  # when the ground station's last heartbeat came
         self._operator_lost = False
 
@@ -86,18 +86,15 @@ class ArduPilotFlight(Flight):
         if self.mode is Mode.GUIDED:
             on = self.on
             limit = on.speed_limit
-            self._take(read_setpoint(message, on.estimate, on.origin, speed_limit=limit))
+            self.go_to(read_setpoint(message, on.estimate, on.origin, speed_limit=limit))
 
-    def go_to(self, place: Destination | None) -> None:
-        """Take a place; ignore None ("here"), which ArduPilot does not know."""
-        self._take(place)
-
-    def _take(self, target: Target | None) -> None:
-        if target is None:
+    def go_to(self, place: Target | None) -> None:
+        """Take a target; ignore None ("here"), which ArduPilot does not know."""
+        if place is None:
             return
-        if isinstance(target, Destination) and target != self.setpoint:
-            self._speed = None
-        self.setpoint = target
+        if isinstance(place, Destination) and place != self.setpoint:
+            self._speed = math.inf
+        self.setpoint = place
         self._taken_at = self.on.now
 
     def change_speed(self, speed: float) -> bool:
@@ -115,9 +112,7 @@ class ArduPilotFlight(Flight):
             case None:
                 return STOP
             case Destination() as place:
-                limit = self.on.speed_limit
-                speed = limit if self._speed is None else min(self._speed, limit)
-                demand = self._steer(place, speed, ARRIVAL_RADIUS)
+                demand = self.steer_to(place, self._speed, ARRIVAL_RADIUS)
                 if demand is not None:
                     return demand
                 # The real one sends this for a guided target, too, although no mission runs.
@@ -132,13 +127,12 @@ class ArduPilotFlight(Flight):
         self.setpoint = None
         return STOP
 
-    def steer_to(self, place: Destination) -> Demand | None:
-        """Return the demand in AUTO and RTL; None on arrival."""
-        return self._steer(place, self.on.speed_limit, REACHED_RADIUS)
-
-    def _steer(self, place: Destination, speed_limit: float, radius: float) -> Demand | None:
-        pivots = self.on.persona.frame.turns_on_the_spot
-        return steer_to_place(self.on.estimate, place, speed_limit, radius, pivots=pivots)
+    def steer_to(
+        self, place: Destination, most: float = math.inf, radius: float = REACHED_RADIUS
+    ) -> Demand | None:
+        """Return the demand towards a place, by default as in AUTO and RTL; None on arrival."""
+        on, pivots = self.on, self.on.persona.frame.turns_on_the_spot
+        return steer_to_place(on.estimate, place, min(most, on.speed_limit), radius, pivots=pivots)
 
     def hold(self) -> Demand:
         """Return the demand that stops the rover; HOLD drives to no place."""

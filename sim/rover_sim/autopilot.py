@@ -201,7 +201,7 @@ class Autopilot:
         self._drive = drive(on)
         self._home_told, self._shown_mode = self._flight.home, self.mode
         self._telemetry = Telemetry(on, unix_offset=self._unix_offset)
-        self._commands = Commands(on, self._send, self._restart)
+        self._commands = Commands(on, self._send, lambda: self.reboot(now=on.now))
 
     def _send(self, message_id: int) -> bool:
         on = self._on
@@ -238,9 +238,6 @@ class Autopilot:
         if name is not None and self._on.now >= self._runtime_due:
             self._runtime_due += RUNTIME_INTERVAL
             parameters.change(name, parameters[name] + RUNTIME_INTERVAL)
-
-    def _restart(self) -> None:
-        self.reboot(now=self._on.now)
 
     def _announce(self) -> None:
         """Send a heartbeat at once if the mode changed, as some makes do."""

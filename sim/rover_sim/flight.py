@@ -41,15 +41,10 @@ class Flight:
         return f"{type(self).__name__}({self.mode.name}, {'armed' if self.armed else 'disarmed'})"
 
     @property
-    def target(self) -> Target | None:
-        """The target of the setpoints while they are followed, else None."""
-        return self.setpoint if self.mode is Mode.GUIDED else None
-
-    @property
     def destination(self) -> Destination | None:
         """The place that the rover drives to, or None."""
         if self.mode is Mode.GUIDED:
-            return self.target if isinstance(self.target, Destination) else None
+            return self.setpoint if isinstance(self.setpoint, Destination) else None
         if self.mode is Mode.HOLD:
             return self.hold_destination
         waypoint = self._waypoint
@@ -221,7 +216,7 @@ class Flight:
                 demand = self.hold()
             case Mode.GUIDED:  # called also while disarmed, so that its time-out runs
                 demand = self.follow_setpoint()
-                if isinstance(self.target, Heading | TurnRate):
+                if isinstance(self.setpoint, Heading | TurnRate):
                     demand = on.sticks.nudged(demand)
             case Mode.AUTO | Mode.RTL:
                 demand = self._follow_route() if self.armed else STOP

@@ -47,7 +47,7 @@ class Px4Flight(Flight):
         self._setpoint_speed: float | None = None  # m/s towards a place, if the setpoint has one
         self._last_setpoint = float("-inf")
         self._gap = math.inf  # s between the last two setpoints
-        self._cruise: float | None = None  # m/s, from DO_CHANGE_SPEED
+        self._cruise = math.inf  # m/s, from DO_CHANGE_SPEED
         self._guidance = Px4Guidance(on)
         self._held_at: Destination | None = None  # where HOLD began; None: set at the next step
         self._there_since: float | None = None  # at the end of a return, or in LAND
@@ -71,7 +71,8 @@ class Px4Flight(Flight):
         HOLD keeps the rover's place at its first step.
         """
         del mode
-        self.hold_destination = self._cruise = self._held_at = None
+        self.hold_destination = self._held_at = None
+        self._cruise = math.inf
 
     def can_run(self, mode: Mode) -> bool:
         """Return whether setpoints stream (two or more, the last one recently), or a mission is."""
@@ -155,7 +156,7 @@ class Px4Flight(Flight):
         """Set the speed until the mode changes; 0 or less resets it. Return False if not finite."""
         if not math.isfinite(speed):
             return False
-        self._cruise = speed if speed > 0.0 else None
+        self._cruise = speed if speed > 0.0 else math.inf
         return True
 
     def follow_setpoint(self) -> Demand:
@@ -164,26 +165,22 @@ class Px4Flight(Flight):
             case None:
                 return STOP
             case Destination() as place:
-                return self._drive_to(place, self._setpoint_speed or math.inf) or STOP
+                return self.steer_to(place, self._setpoint_speed or math.inf) or STOP
             case Heading(yaw, speed):
                 return self._guidance.to_course(yaw, speed)
             case TurnRate(yaw_rate, speed):
                 return Demand(speed, yaw_rate)
 
-    def steer_to(self, place: Destination) -> Demand | None:
-        """Return the demand in AUTO and RTL; None on arrival."""
-        return self._drive_to(place)
-
     def hold(self) -> Demand:
         """Return the demand to the place of DO_REPOSITION, or back to where HOLD began."""
         if self._held_at is None:
             self._held_at = self._here
-        demand = self._drive_to(self.hold_destination or self._held_at)
+        demand = self.steer_to(self.hold_destination or self._held_at)
         if demand is None and self.hold_destination is not None:
             self._held_at, self.hold_destination = self.hold_destination, None
         return demand or HOLD
 
-    def _drive_to(self, place: Destination, most: float = math.inf) -> Demand | None:
-        limit = self.on.speed_limit
-        speed = min(most, limit if self._cruise is None else min(self._cruise, limit))
+    def steer_to(self, place: Destination, most: float = math.inf) -> Demand | None:
+        """Return the demand towards a place, by default as in AUTO and RTL; None on arrival."""
+        speed = min(most, self._cruise, self.on.speed_limit)
         return self._guidance.to_place(place, speed, radius=self.on.parameters["NAV_ACC_RAD"])
