@@ -137,7 +137,7 @@ class RealTime:
     def start_rovers(self) -> str:
         """Start the rovers; return their URL."""
         options = self._options
-        text = f"--port=0 --body={options.body} --persona={options.persona}"
+        text = f"--port=0 --peers=all --body={options.body} --persona={options.persona}"
         text += f" --frame={options.make.frame.value} --count={options.count} --seed={self._seed}"
         rovers = self._start("rover_sim", text)
         return "udpout:" + rovers.said(r"on udp (127\.0\.0\.1:\d+)")[1]

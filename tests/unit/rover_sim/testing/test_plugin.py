@@ -157,12 +157,13 @@ def test_code_with_a_socket_of_its_own_has_real_processes(
                 link.mav.heartbeat_send(6, 8, 0, 0, 4)
                 assert link.wait_heartbeat(timeout=10).autopilot == 12, "not a PX4"
                 link.close()
-            assert not "shown"
+            raise RuntimeError("both are PX4")
     """
     pytester.makepyfile(test_patrol=source)
     result = pytester.runpytest_subprocess(*PLUGIN)  # pymavlink loads numpy, which cannot be undone
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*- simulated rover -*", "seed *", "rover_sim:", "mav_tasks.cli:"])
+    result.stdout.fnmatch_lines(["E*both are PX4", "*- simulated rover -*", "seed *"])
+    result.stdout.fnmatch_lines(["rover_sim:", "mav_tasks.cli:"])
     result.stdout.fnmatch_lines(["*rover 2: found*"])
 
 
