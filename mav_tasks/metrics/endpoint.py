@@ -46,10 +46,11 @@ class Endpoint:
         restored: Restored | None,
         version: str,
         woke_at: Callable[[], float],
+        loop: asyncio.AbstractEventLoop,
     ) -> Collector:
-        """Return an observer whose figures are served from now on.
+        """Return an observer whose figures are served from now on, made in the server's loop.
 
-        Call it in the running event loop; ``Collector`` explains the arguments.
+        ``Collector`` explains the other arguments.
         """
         collector = Collector(
             figures,
@@ -59,7 +60,6 @@ class Endpoint:
             version=version,
             woke_at=woke_at,
         )
-        loop = asyncio.get_running_loop()
         self._server.start(Pages(collector, loop=loop, answers=self._answers).by_path)
         return collector
 

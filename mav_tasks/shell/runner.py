@@ -198,17 +198,16 @@ class Runner:
         """When the present callback began, and with it the reading of what it handles."""
         return self._ran_at
 
-    def serve(self) -> int:
+    def serve(self, loops: asyncio.Runner) -> int:
         """Serve until SIGINT or SIGTERM; return the exit code, or EVICTED.
 
         The loop has their handlers before it runs: one that raises there could make it forget the
         task that it was about to start, and the process would never end.
         """
-        with asyncio.Runner() as runner:
-            self._loop = runner.get_loop()
-            for number in (signal.SIGINT, signal.SIGTERM):
-                self._loop.add_signal_handler(number, self._on_signal)
-            return runner.run(self._serve(self._loop))
+        self._loop = loops.get_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._loop.add_signal_handler(number, self._on_signal)
+        return loops.run(self._serve(self._loop))
 
     async def _serve(self, loop: asyncio.AbstractEventLoop) -> int:
         self._over = loop.create_future()

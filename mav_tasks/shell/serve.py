@@ -1,5 +1,6 @@
 """The composition root: starts a server from its settings, with links, store and runner."""
 
+import asyncio
 import gc
 import json
 import logging
@@ -149,6 +150,7 @@ def _serve(settings: ServerSettings, reload: Reload) -> int:
             say,
             metrics,
             gateway,
+            opened.enter_context(asyncio.Runner()),
         )
 
 
@@ -236,6 +238,7 @@ def _run(
     say: Callable[[str], None],
     metrics: "Endpoint | None",
     gateway: "Gateway | None",
+    loops: asyncio.Runner,
 ) -> int:
     now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)
@@ -257,6 +260,7 @@ def _run(
             restored=restored,
             version=project_version(),
             woke_at=lambda: runner.woke_at,
+            loop=loops.get_loop(),
         )
         listeners.append(collector)
     runner = Runner(
@@ -270,7 +274,7 @@ def _run(
         keys=keys,
         lease=gateway,
     )
-    return runner.serve()
+    return runner.serve(loops)
 
 
 def _say(words: str, *, as_json: bool) -> None:

@@ -35,9 +35,9 @@ def serve_signalled_at(number):
 
     serve = Runner.serve
 
-    def traced(self):
+    def traced(self, loops):
         sys.settrace(trace)
-        return serve(self)
+        return serve(self, loops)
 
     Runner.serve = traced
     Runner._tend = lambda self, loop: self._finish(9) if lines < number else None  # no signal came
