@@ -8,12 +8,6 @@ from mav_tasks.tasks.lifecycle import INITIAL, TERMINAL, TRANSITIONS, TaskState
 from tests.kit.joint.graph import can_happen, variants
 from tests.kit.joint.model import MAKES, happens
 
-NAMES = {
-    Queue.RUNS: "runs",
-    Queue.PAUSED: "paused",
-    Queue.TAKEN: "taken",
-    Queue.STOPPED: "stopped",
-}
 NOTES = {
     Queue.RUNS: "tasks run one after another",
     Queue.PAUSED: "no task starts before a resume",
@@ -64,7 +58,7 @@ def of_task() -> str:
     return "\n".join(lines)
 
 
-def _name(state: TaskState) -> str:
+def _name(state: TaskState | Queue) -> str:
     return state.name.lower()
 
 
@@ -88,10 +82,10 @@ def _edges() -> dict[tuple[Queue, Queue], list[Event]]:
 def of_queue() -> str:
     """Return the states of a queue, from the control table, as a Mermaid state diagram."""
     lines = ["```mermaid", "stateDiagram-v2", "    [*] --> runs"]
-    lines += [f"    {NAMES[queue]}: {NAMES[queue]}, {note}" for queue, note in NOTES.items()]
+    lines += [f"    {_name(queue)}: {_name(queue)}, {note}" for queue, note in NOTES.items()]
     for (old, new), events in _edges().items():
         words = ", ".join(
             WORDS.get(event, event.name.lower().replace("_", " ")) for event in events
         )
-        lines.append(f"    {NAMES[old]} --> {NAMES[new]}: {words}")
+        lines.append(f"    {_name(old)} --> {_name(new)}: {words}")
     return "\n".join([*lines, "```", ""])
