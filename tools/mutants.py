@@ -17,14 +17,14 @@ import builtins
 import json
 import os
 import random
-import subprocess
 import sys
-import tempfile
 import time
-from collections import defaultdict
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from importlib.machinery import SourceFileLoader
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,6 +43,10 @@ PROBE = "_reached_mutant"
 PAIRS = ["Lt LtE", "Gt GtE", "Eq NotEq", "Is IsNot", "In NotIn", "And Or", "Add Sub", "Mult Div"]
 SWAPS = {getattr(ast, a): getattr(ast, b) for a, b in map(str.split, PAIRS)}
 SWAPS |= {b: a for a, b in SWAPS.items()}
+#: of modules: the nodes that get faults, and the numbers of the nodes that are watched
+Changes = dict[str, tuple[list[int], dict[int, int]]]
+#: of tests: name, seconds, whether it passed, and what of the watched it reached
+Results = list[tuple[str, float, bool, set[int]]]
 
 
 class Mutant(NamedTuple):
@@ -152,7 +156,7 @@ class Watch:
     def __init__(self) -> None:
         self.seen: set[int] = set()
         self.has_failed = False
-        self.results: list[tuple[str, float, bool, list[int]]] = []
+        self.results: Results = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note a failure."""
@@ -166,15 +170,19 @@ class Watch:
         began = time.monotonic()
         done = yield
         seconds = time.monotonic() - began
-        self.results.append((item.nodeid, seconds, not self.has_failed, sorted(self.seen)))
+        self.results.append((item.nodeid, seconds, not self.has_failed, {*self.seen}))
         if time.process_time() > BUDGET and item.config.option.maxfail:
             item.session.shouldstop = "budget"
         return done
 
 
-def inside(job: Path) -> None:
-    """Run the tests of a job with its changed modules; write the results beside it."""
-    tests, changes = json.loads(job.read_text(encoding="utf-8"))
+def inside(tests: list[str], changes: Changes) -> Results | None:
+    """Run tests with changed modules, without output; return the results, None if there are none.
+
+    It changes its process, and may end it.
+    """
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    os.dup2(1, 2)
     trees = {str(ROOT / path): changed(path, *how) for path, how in changes.items()}
     get_code, watch = SourceFileLoader.get_code, Watch()
     vars(builtins)[PROBE] = watch.seen.add
@@ -190,25 +198,20 @@ def inside(job: Path) -> None:
     options += ["-x"] if any(faults for faults, _ in changes.values()) else []
     status = pytest.main([*tests, *options], plugins=[watch])
     if status == pytest.ExitCode.INTERRUPTED and not watch.results:  # the import fails
-        watch.results.append(("collection", 0.0, False, []))
-    if status <= pytest.ExitCode.INTERRUPTED:
-        job.with_suffix(".out").write_text(json.dumps(watch.results), encoding="utf-8")
+        watch.results.append(("collection", 0.0, False, set()))
+    return watch.results if status <= pytest.ExitCode.INTERRUPTED else None
 
 
-def run(tests: list[str], changes: dict[str, Any]) -> Any:
+def run(tests: list[str], changes: Changes) -> Results | None:
     """Run tests in a process of their own; return the results, None if it died."""
-    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        job = Path(folder, "job")
-        job.write_text(json.dumps((tests, changes)), encoding="utf-8")
-        command = [sys.executable, __file__, "--inside", str(job)]
-        subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
-        out = job.with_suffix(".out")
-        return json.loads(out.read_text(encoding="utf-8")) if out.exists() else None
+    with suppress(BrokenProcessPool), ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(inside, tests, changes).result()
+    return None
 
 
 def reached(mutants: list[Mutant], paths: list[str], jobs: int) -> list[list[tuple[float, str]]]:
     """Return for each mutant the tests that pass and reach it, the quickest first."""
-    probes: dict[str, Any] = defaultdict(lambda: ([], {}))
+    probes: Changes = {mutant.path: ([], {}) for mutant in mutants}
     for number, mutant in enumerate(mutants):
         probes[mutant.path][1][number] = mutant.node
     files = [str(file) for path in map(Path, paths) for file in path.rglob("test_*.py")]
@@ -247,11 +250,9 @@ def main() -> None:
     for name, default in (("count", 200), ("seed", 1), ("jobs", 2), ("show", None)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--only", nargs="*", default=["tests"], metavar="PATH")
-    for name in ("mutants", "out", "inside"):  # the last one is for this program itself
+    for name in ("mutants", "out"):
         parser.add_argument(f"--{name}", type=Path, metavar="FILE")
     options = parser.parse_args()
-    if options.inside:
-        return inside(options.inside)
     again = options.mutants
     mutants = survivors(again) if again else sample(options.count, options.seed)
     if options.show is not None:
