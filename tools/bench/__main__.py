@@ -15,7 +15,7 @@ from tests.kit.other_revision import checked_out
 
 from . import driving, engine, fleet, floods, load, speed, uploads, web
 from .processes import BUILD, ROOT
-from .rows import Row, comparison, table
+from .rows import Row, compare, show
 
 #: of a server or an engine, which may be another revision's
 MEASUREMENTS: dict[str, Callable[[Path], Iterator[Row]]] = {
@@ -23,7 +23,7 @@ MEASUREMENTS: dict[str, Callable[[Path], Iterator[Row]]] = {
     "durable": speed.durable,
     "postgres": speed.postgres,
     "recorded": speed.recorded,
-    "stop": speed.stop,
+    "stop": floods.stop,
     "forwarding": speed.forwarding,
     "telemetry": speed.telemetry,
     "uploads": uploads.measure,
@@ -55,21 +55,19 @@ def main() -> None:
     parser.add_argument("--against", metavar="REVISION", help="measure that revision, too")
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="with --against")
     options = parser.parse_args()
-    unknown = set(options.rows) - MEASUREMENTS.keys()
-    if unknown:
+    if unknown := set(options.rows) - MEASUREMENTS.keys():
         parser.error(f"unknown: {', '.join(sorted(unknown))}")
     BUILD.mkdir(exist_ok=True)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # ends its processes
     names = options.rows or list(MEASUREMENTS)
     if options.against is None:
-        print(table(measured(names, ROOT)))
-        return
+        return show(measured(names, ROOT))
     with checked_out(options.against) as there:
         found: dict[Path, list[Row]] = {ROOT: [], there: []}
         for number in range(options.rounds):
             for tree in (ROOT, there) if number % 2 else (there, ROOT):
                 found[tree] += measured(names, tree)
-    print(comparison(found[ROOT], found[there]))
+    return compare(found[ROOT], found[there])
 
 
 def measured(names: list[str], tree: Path) -> list[Row]:

@@ -22,12 +22,14 @@ import json
 import sys
 import tracemalloc
 from collections.abc import Callable
+from contextlib import nullcontext
+from cProfile import Profile
 from time import process_time_ns
 from typing import Any
 
 from mav_tasks.config.settings import Clients, Limits, Queueing, Roles, Settings
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import Committed, LinkChanged, LinkSide, Packets
+from mav_tasks.engine.inputs import Committed, Input, LinkChanged, LinkSide, Packets
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
@@ -51,26 +53,8 @@ SETTLED = 30.0  # s, after which the server's requests to the rover have ended
 APART = 0.1  # s, between the submissions of the waiting tasks
 BETWEEN = 0.001  # s of virtual time between two turns
 TURNS, ROUNDS = 100, 20  # turns with one engine; more would outlast the starting of the task
+NOTHING = nullcontext()
 STRANGERS_APART = 0.01  # s between two packets from one endpoint
-
-
-class Calls:
-    """Counts the calls of Python functions while it is entered.
-
-    A comprehension is a function up to Python 3.11, and each step of a generator is a call.
-    """
-
-    count = 0
-
-    def __enter__(self) -> None:
-        sys.setprofile(self._note)
-
-    def __exit__(self, *_: object) -> None:
-        sys.setprofile(None)
-        self.count -= 1  # this one
-
-    def _note(self, _frame: object, event: str, _what: object) -> None:
-        self.count += event == "call"
 
 
 class Clock:
@@ -85,6 +69,23 @@ class Clock:
         self.spent += process_time_ns()
 
 
+class Calls(Profile):
+    """Counts the calls of Python functions while it is entered.
+
+    A comprehension is a function up to Python 3.11, and each step of a generator is a call.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(builtins=False)
+
+    @property
+    def count(self) -> int:
+        """How many there were, without those of ``__exit__``."""
+        return sum(
+            each.callcount for each in self.getstats() if each.code is not Profile.__exit__.__code__
+        )
+
+
 class World:
     """An engine with a scripted rover and client, in virtual time."""
 
@@ -97,45 +98,23 @@ class World:
         self.take(LinkChanged(VEHICLES, LinkSide.VEHICLES, True, (ROVER,)))
         self.take(LinkChanged(CLIENTS, LinkSide.CLIENTS, True))
 
-    def moves(self, count: int) -> list[tuple[str, bytes]]:
+    def moves(self, count: int) -> Packets:
         """Return the client's submissions of other tasks."""
         found = []
         for _ in range(count):
             self._submitted += 1
             params = 1.0, 0.0, 0.0, self._submitted, 0.0, 0.0, 5.0
             found.append((CLIENT, self._client(m.CommandLong(1, 191, MOVE, 0, *params))))
-        return found
+        return Packets(CLIENTS, found)
 
-    def turn(self, packets: list[tuple[str, bytes]], measured: Any) -> None:
-        """Let the engine answer the client's packets, and measure the effort."""
-        engine, now = self.engine, self.now
-        with measured:
-            engine.handle(Packets(CLIENTS, packets), now=now)
-            engine.take_packets()
-            events = engine.take_events()
-        self._events += len(events)
-        with measured:
-            engine.handle(Committed(self._events), now=now)
-            engine.take_packets()
-            events = engine.take_events()
-        self._events += len(events)
-
-    def run(self, seconds: float, measured: Callable[[], Any] = Clock) -> None:
+    def run(self, seconds: float, measured: Callable[[], Any] = nullcontext) -> None:
         """Advance time, and measure the effort of each wake-up."""
         end = self.now + seconds
         while self.now < end:
             due = self.engine.next_deadline() or end
             self.now = min(end, due, self._ticks * TELEMETRY)
             if due <= self.now:
-                engine, now = self.engine, self.now
-                with measured():
-                    engine.handle_deadline(now=now)
-                    packets = engine.take_packets()
-                    events = engine.take_events()
-                    engine.next_deadline()
-                self._events += len(events)
-                self._hear(packets)
-                self.drain()
+                self.wake(measured())
             if self._ticks * TELEMETRY <= self.now:
                 boot = round(self.now * 1000)
                 self.say(m.Attitude(boot, 0, 0, 0, 0, 0, 0))
@@ -147,33 +126,37 @@ class World:
                     self.take(Packets(CLIENTS, [(CLIENT, beat)]))
                 self._ticks += 1
 
+    def wake(self, measured: Any = NOTHING) -> None:
+        """Let the engine do what is due."""
+        engine, now = self.engine, self.now
+        with measured:
+            engine.handle_deadline(now=now)
+            packets, events = engine.take_packets(), engine.take_events()
+            engine.next_deadline()
+        self._follow(packets, events, NOTHING)
+
     def say(self, message: m.Message) -> None:
         """Send a message of the rover."""
         self.take(Packets(VEHICLES, [(ROVER, self._rover(message))]))
 
-    def take(self, item: Packets | LinkChanged) -> None:
-        """Let the engine process an input and its consequences."""
-        self.engine.handle(item, now=self.now)
-        self.drain()
+    def take(self, item: Input, measured: Any = NOTHING) -> None:
+        """Let the engine process an input and its consequences, and measure the effort."""
+        engine, now = self.engine, self.now
+        with measured:
+            engine.handle(item, now=now)
+            packets, events = engine.take_packets(), engine.take_events()
+        self._follow(packets, events, measured)
 
-    def drain(self) -> None:
+    def _follow(self, packets: Any, events: Any, measured: Any) -> None:
         """Let the rover accept every command, and commit every event."""
-        while True:
-            packets, events = self.engine.take_packets(), self.engine.take_events()
-            self._hear(packets)
-            if events:
-                self._events += len(events)
-                self.engine.handle(Committed(self._events), now=self.now)
-            elif not packets:
-                return
-
-    def _hear(self, packets: Any) -> None:
         for outgoing in packets:
             for packet in split_datagram(outgoing.data) if outgoing.link == VEHICLES else ():
                 message = Decoder().decode(packet)
                 if isinstance(message, m.CommandLong):
-                    accepted = self._rover(m.CommandAck(message.command, 0))
-                    self.engine.handle(Packets(VEHICLES, [(ROVER, accepted)]), now=self.now)
+                    self.say(m.CommandAck(message.command, 0))
+        self._events += len(events)
+        if events:
+            self.take(Committed(self._events), measured)
 
 
 def with_queue() -> World:
@@ -181,7 +164,7 @@ def with_queue() -> World:
     world = World(UNLIMITED, CUSTOM | ARMED)
     world.run(MEETING)
     for _ in range(WAITING):
-        world.take(Packets(CLIENTS, world.moves(1)))
+        world.take(world.moves(1))
         world.run(APART)
     return world
 
@@ -192,7 +175,7 @@ def calls(at_once: int = 1) -> float:
     for _ in range(3):
         world.run(3 * APART)
         counted = Calls()
-        world.turn(world.moves(at_once), counted)
+        world.take(world.moves(at_once), counted)
     return counted.count / at_once
 
 
@@ -218,7 +201,7 @@ def cpu() -> float:
         world = with_queue()
         for _ in range(TURNS):
             world.run(BETWEEN)
-            world.turn(world.moves(1), clock)
+            world.take(world.moves(1), clock)
     return clock.spent / (ROUNDS * TURNS) / 1e9
 
 
@@ -235,16 +218,12 @@ def cost(endpoints: int, addresses: int, packets: int) -> tuple[int, float]:
             if number % endpoints == 0:
                 world.now += STRANGERS_APART
                 world.say(m.Heartbeat(10, 3, CUSTOM, HOLD, 3, 3))
-                world.engine.handle_deadline(now=world.now)
-                world.drain()
+                world.wake()
             message: m.Message = m.Heartbeat(6, 8, 0, 0, 4, 3)
             if turn >= 0:
                 command = CONTINUE if turn % 5 else REQUEST
                 message = m.CommandLong(1, 191, command, 0, 1, 0, 0, 0, turn, number, 0)
-            item = Packets(CLIENTS, [(peer, encode(message))])
-            with clock:
-                world.engine.handle(item, now=world.now)
-            world.drain()
+            world.take(Packets(CLIENTS, [(peer, encode(message))]), clock)
         if turn < 0:
             clock.spent = 0
             before = allocated()

@@ -1,13 +1,14 @@
-"""STOPs, setpoints and memory of a server that a client floods with datagrams.
+"""STOPs, setpoints and memory of a server that is flooded with datagrams.
 
-The flood comes on the client's own link, which is the worst case, and reads no answers.
+A client's flood comes on its own link, which is the worst case, and reads no answers.
 """
 
 import random
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
-from itertools import count
+from itertools import count, repeat
 from pathlib import Path
 
 from mav_tasks.mavlink import messages as m
@@ -16,17 +17,17 @@ from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.signing import signed
 
-from .driving import drive
-from .processes import beside, server, simulated_rovers
+from .driving import driven
+from .processes import beside
 from .rows import Row, percentiles
-from .speed import stopped
-from .wire import CLIENT, STATION, Speaker, introduced, move, stops
+from .wire import CLIENT, STATION, STOP, Rovers, Speaker, effect, introduced, move, stops
 
 ROVERS = 5
-SECONDS = 5.0  # of driving
 RATE = 20_000  # datagrams/s demanded; a slow machine sends fewer
-STOPS = 150
+TELEMETRY = 5_000  # packets/s
+FEW, MANY = 150, 300  # STOPs
 AT_A_TIME = 64  # sockets of strangers at once
+ZERO = m.SetPositionTargetLocalNed.id
 SECRET = b"nobody knows this key at all ..."
 
 client = Encoder(CLIENT).encode
@@ -70,29 +71,63 @@ FLOODS: dict[str, Callable[[], Iterator[bytes]]] = {
     "signatures": lambda: (
         signed(made, SECRET, link_id=1, timestamp=at) for at, made in enumerate(commands())
     ),
-    "strangers": lambda: (client(STATION) for _ in count()),
+    "strangers": lambda: repeat(client(STATION)),
 }
 
 
-def flood(packets: Iterator[bytes], rate: float, sockets: Callable[[], list[Speaker]]) -> None:
-    """Send datagrams at a rate, each AT_A_TIME from these sockets."""
+def flood(rate: float, packets: Iterable[bytes], speakers: Iterable[Speaker]) -> None:
+    """Send datagrams at a rate, each from the next of these."""
     begin = time.monotonic()
-    speakers: list[Speaker] = []
-    for sent, packet in enumerate(packets):
-        if sent % AT_A_TIME == 0:
-            speakers = sockets()
-        speakers[sent % len(speakers)].socket.send(packet)
-        ahead = begin + sent / rate - time.monotonic()
-        if sent % 10 == 0 and ahead > 0:
-            time.sleep(ahead)
+    for sent, (packet, speaker) in enumerate(zip(packets, speakers, strict=False)):
+        speaker.socket.send(packet)
+        if sent % 10 == 0:
+            time.sleep(max(0.0, begin + sent / rate - time.monotonic()))
 
 
-def from_clients(kind: str, port: int, rate: float) -> None:
-    """Flood a server: of strangers each AT_A_TIME have new sockets."""
-    own = [Speaker(to=port)]
-    strangers = kind == "strangers"
-    many = range(AT_A_TIME)
-    flood(FLOODS[kind](), rate, lambda: [Speaker(to=port) for _ in many] if strangers else own)
+def from_clients(kind: str, rate: float, port: int) -> None:
+    """Flood a server: each datagram of strangers has a new socket."""
+    flood(
+        rate, FLOODS[kind](), strangers(port) if kind == "strangers" else repeat(Speaker(to=port))
+    )
+
+
+def strangers(port: int) -> Iterator[Speaker]:
+    """Yield new clients without end."""
+    present: deque[Speaker] = deque(maxlen=AT_A_TIME)
+    while True:
+        present.append(Speaker(to=port))
+        yield present[-1]
+
+
+def from_rover(rover: Rovers) -> None:
+    """Flood a server with telemetry."""
+    made = (rover.encode(m.Attitude(at & 0xFFFFFF, 0, 0, 0.1, 0, 0, 0)) for at in count())
+    flood(TELEMETRY, made, repeat(rover))
+
+
+def stop(tree: Path) -> Iterator[Row]:
+    """STOP → zero setpoint, while the rover floods the server with telemetry; beside without."""
+    found = []
+    for is_flooded in (False, True):
+        with (
+            introduced(tree) as (_, client, rover),
+            beside(from_rover, rover) if is_flooded else nullcontext(),
+        ):
+            times, _ = stops(lambda: stopped(client, rover), count=MANY)
+        found.append(percentiles(times))
+    calm, flooded = found
+    what = f"STOP → zero setpoint, {TELEMETRY:,} packets/s"
+    yield Row(f"{what}, p99", flooded.p99, "ms", calm.p99, "without", "≤ 5 ms")
+    yield Row(f"{what}, p50", flooded.p50, "ms", calm.p50, "without")
+
+
+def stopped(client: Speaker, rover: Rovers) -> float:
+    """Return the seconds of a STOP until its zero setpoint is at the rover's socket."""
+    rover.live()
+    client.beat()
+    rover.drain()
+    client.drain()
+    return effect(client, client.encode(STOP), ZERO, at=rover, within=0.25)
 
 
 def measure(tree: Path) -> Iterator[Row]:
@@ -100,7 +135,7 @@ def measure(tree: Path) -> Iterator[Row]:
     found = {kind: _flooded(tree, kind) for kind in ("", *FLOODS)}
     stop, _, error, memory = found.pop("")
     for kind, (took, lost, late, grown) in found.items():
-        what, note = f"flood of {kind}", f"{lost} of {STOPS} lost"
+        what, note = f"flood of {kind}", f"{lost} of {FEW} lost"
         yield Row(f"{what}: STOP → zero, p99", took, "ms", stop, "without", "≤ 5 ms", note)
         yield Row(f"{what}: setpoint error, p99", late, "ms", error, "without", "≤ 5 ms")
         yield Row(f"{what}: memory grown", grown, "kB", memory, "without")
@@ -108,23 +143,14 @@ def measure(tree: Path) -> Iterator[Row]:
 
 def _flooded(tree: Path, kind: str) -> tuple[float, int, float, float]:
     """Return p99 of STOPs, how many were lost, p99 of setpoints' errors, and memory grown."""
-    with introduced(tree, is_limited=True) as (it, client, rover), _flood(kind, it.port):
-        times, lost = stops(lambda: stopped(client, rover), count=STOPS)
-    with (
-        simulated_rovers(ROVERS) as port,
-        server(tree, port, "--arming=server", is_timed=True, is_limited=True) as it,
-    ):
-        drive(it, ROVERS)
-        with _flood(kind, it.port):
-            before, began = it.memory(), time.monotonic()
-            time.sleep(SECONDS)
-            grown = it.memory() - before
-    errors = [error for _, at, error in it.results() if at >= began]
-    return percentiles(times).p99, lost, percentiles(errors).p99, grown
 
+    @contextmanager
+    def flooding(port: int) -> Iterator[None]:
+        with beside(from_clients, kind, RATE, port) if kind else nullcontext():
+            time.sleep(0.5)
+            yield
 
-@contextmanager
-def _flood(kind: str, port: int) -> Iterator[None]:
-    with beside(from_clients, kind, port, RATE) if kind else nullcontext():
-        time.sleep(0.5)
-        yield
+    with introduced(tree, is_limited=True) as (it, client, rover), flooding(it.port):
+        times, lost = stops(lambda: stopped(client, rover), count=FEW)
+    drive = driven(tree, ROVERS, is_limited=True, meanwhile=flooding)
+    return percentiles(times).p99, lost, drive.errors.p99, drive.grown

@@ -22,6 +22,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Thread
 from typing import Any
 
 from mav_tasks.mavlink import messages as m
@@ -65,8 +66,8 @@ OF_CALL = {
 def http_head(path: str, length: int = 0, method: str = "POST") -> bytes:
     """Return the head of a request."""
     head = f"{method} {path} HTTP/1.1\r\nHost: {HOST}\r\nContent-Length: {length}\r\n"
-    head += "Content-Type: application/json\r\nAccept: application/json, text/event-stream\r\n\r\n"
-    return head.encode()
+    head += "Content-Type: application/json\r\nAccept: application/json, text/event-stream\r\n"
+    return f"{head}Connection: close\r\n\r\n".encode()
 
 
 EVENTS = http_head("/api/v1/events", method="GET")
@@ -95,8 +96,7 @@ def held(port: int, number: int, request: bytes = b"", is_read: Any = 0) -> None
 def repeated(port: int, request: bytes, pause: float = 0.0, at_once: int = 1) -> None:
     """Send a request again and again, each on a connection of its own, and read its answer."""
     for _ in range(at_once - 1):
-        if not os.fork():
-            break
+        Thread(target=repeated, args=(port, request, pause)).start()
     while True:
         with suppress(OSError), socket.create_connection((HOST, port), 30) as connection:
             connection.sendall(request)
@@ -107,8 +107,7 @@ def repeated(port: int, request: bytes, pause: float = 0.0, at_once: int = 1) ->
 
 def posted(path: str, body: bytes, at_once: int = 2) -> tuple[Any, ...]:
     """Return a load of changes."""
-    head = http_head(path, len(body)).replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n")
-    return repeated, head + body, 0.0, at_once
+    return repeated, http_head(path, len(body)) + body, 0.0, at_once
 
 
 def noise(fd: int) -> None:
@@ -143,7 +142,7 @@ AGENTS: dict[str, tuple[Any, ...]] = {
     "half a call": (held, 900, http_head("/mcp", 9) + b"{"),
     "sessions": posted("/mcp", SESSION, at_once=4),
 }
-STRANGERS = {"strangers": (lambda port: from_clients("strangers", port, 5_000),)}
+STRANGERS = {"strangers": (partial(from_clients, "strangers", 5_000),)}
 
 
 def measure(tree: Path) -> Iterator[Row]:
@@ -222,7 +221,7 @@ def _of_links(tree: Path) -> Iterator[Row]:
         for name, port, secret in (("signed", closed, SECRET), ("unsigned", opened, b"")):
             dial = partial(socket.create_connection, (HOST, port), PATIENCE)
             with dial() as known:
-                stop = partial(_stop_by_tcp, partial(_same, known), secret)
+                stop = partial(_stop_by_tcp, partial(nullcontext, known), secret)
                 yield from _loaded(f"TCP link, {name}", LINK, it, stop, port)
             new = partial(_stop_by_tcp, dial, secret)
             yield from _loaded(f"TCP link, {name}, new client", LINK, it, new, port)
@@ -232,10 +231,6 @@ def _of_links(tree: Path) -> Iterator[Row]:
 _STOPS = (
     Encoder(Address(200 + number % 40, 1 + number // 40 % 250)).encode(STOP) for number in count()
 )
-
-
-def _same(known: socket.socket) -> AbstractContextManager[socket.socket]:
-    return nullcontext(known)
 
 
 def _stop_by_tcp(dial: Callable[[], AbstractContextManager[socket.socket]], secret: bytes) -> float:

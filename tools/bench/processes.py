@@ -7,12 +7,12 @@ sees the user's configuration, keys or store.
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,7 +27,6 @@ START_WITHIN = 20.0  # s
 END_WITHIN = 10.0  # s
 CLI = ("-P", "-m", "mav_tasks.cli")
 TIMED_CLI = ("-P", str(Path(__file__).with_name("timed_serve.py")))
-DEFAULTS = {"--store": "--store=:memory:", "--push": "--no-push"}
 #: as many commands as a measurement has, at any rate
 UNLIMITED = [
     f"--set={setting}"
@@ -81,8 +80,9 @@ class Process:
 
 def environment(tree: Path) -> dict[str, str]:
     """Return an environment with the modules of a tree, whose bytecode is kept, as installed."""
-    paths = {"PYTHONPATH": f"{tree}:{tree / 'sim'}", "MAV_TASKS_CONFIG": ""}
-    return {**os.environ, **paths, "PYTHONHASHSEED": "0", "PYTHONDONTWRITEBYTECODE": ""}
+    modules = {"PYTHONPATH": f"{tree}:{tree / 'sim'}", "PYTHONHASHSEED": "0"}
+    ours = {"MAV_TASKS_CONFIG": "", "MAV_TASKS_LINKS_PUSH": "", "MAV_TASKS_STORE": ":memory:"}
+    return {**os.environ, **modules, **ours, "PYTHONDONTWRITEBYTECODE": ""}
 
 
 @contextmanager
@@ -116,19 +116,13 @@ def process(*arguments: str, tree: Path = ROOT, ready: str = "") -> Iterator[Pro
 @contextmanager
 def beside(do: Callable[..., object], *arguments: object) -> Iterator[None]:
     """Call a function in a process of its own for a ``with`` block, then kill it."""
-    pid = os.fork()
-    if not pid:
-        os.setpgrp()
-        try:
-            do(*arguments)
-        finally:
-            os._exit(1)  # what has to be cleaned up is the parent's
-    os.setpgid(pid, pid)
+    it = get_context("fork").Process(target=do, args=arguments)
+    it.start()
     try:
         yield
     finally:
-        os.killpg(pid, signal.SIGKILL)
-        os.waitpid(pid, 0)
+        it.kill()
+        it.join()
 
 
 def bare(*ports: int) -> AbstractContextManager[Process]:
@@ -144,21 +138,13 @@ def server(
     """Run a server for a ``with`` block, for a client's port and a rover's.
 
     With ``is_timed``, its results are triples: a rover's system id, when a moving setpoint to it
-    left, and the deviation from 1/20 s of the time since the one before.
+    left, and the seconds since the one before.
     """
     (port,) = free_udp_ports(1)
     links = f"--client=udpin:{HOST}:{port}", f"--vehicle=udpout:{HOST}:{rover}"
     limits = [] if is_limited else UNLIMITED
-    missing = [
-        word
-        for name, word in DEFAULTS.items()
-        if not any(each.startswith(name) for each in options)
-    ]
-    with process(
-        *(TIMED_CLI if is_timed else CLI),
-        *("serve", "--config=", *links, *limits, *missing, *options),
-        tree=tree,
-    ) as it:
+    cli = TIMED_CLI if is_timed else CLI
+    with process(*cli, "serve", *links, *limits, *options, tree=tree) as it:
         it.port = port
         yield it
 

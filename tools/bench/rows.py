@@ -3,10 +3,15 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from statistics import quantiles
+from statistics import median, quantiles
 from typing import NamedTuple
 
+from rich.box import MARKDOWN
+from rich.console import Console
+from rich.table import Table
+
 SCALES = {"µs": 1e6, "ms": 1e3, "%": 1e2, "kB": 1e-3, "MB": 1e-6}  # of SI units
+WIDTH = 250  # characters of a table, so that no cell is wrapped
 
 
 class Percentiles(NamedTuple):
@@ -69,32 +74,23 @@ def latencies(
     yield Row(f"{what}, p99", ours.p99, unit, beside.p99, of)
 
 
-def table(rows: Sequence[Row]) -> str:
-    """Return the table of one revision."""
-    head = ("what", "figure", "yardstick", "ratio", "goal", "met", "")
-    return _aligned([head, *(row.cells() for row in rows)])
+def show(rows: Sequence[Row]) -> None:
+    """Print the table of one revision."""
+    made = Table("what", "figure", "yardstick", "ratio", "goal", "met", "", box=MARKDOWN)
+    for row in rows:
+        made.add_row(*row.cells())
+    Console(width=WIDTH).print(made)
 
 
-def comparison(here: Sequence[Row], there: Sequence[Row]) -> str:
-    """Return the table of two revisions: medians of the rounds, and the figures of each."""
-    lines: list[tuple[str, ...]] = [
-        ("what", "here", "there", "here/there", "here, all rounds", "there, all rounds")
-    ]
-    for what, row in {row.what: row for row in here}.items():
-        ours, theirs = ([row.figure for row in rows if row.what == what] for rows in (here, there))
-        if not theirs:
-            continue
-        medians = [sorted(each)[len(each) // 2] for each in (ours, theirs)]
-        ratio = f"{medians[0] / medians[1]:.2f}" if medians[1] else ""
-        rounds = (" ".join(shown(one, row.unit) for one in each) for each in (ours, theirs))
-        lines.append((what, *(shown(each, row.unit) for each in medians), ratio, *rounds))
-    return _aligned(lines)
-
-
-def _aligned(lines: Sequence[Sequence[str]]) -> str:
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    padded = [
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in [*lines[:1], ["-" * width for width in widths], *lines[1:]]
-    ]
-    return "\n".join(padded)
+def compare(here: Sequence[Row], there: Sequence[Row]) -> None:
+    """Print the table of two revisions: medians of the rounds, and the figures of each."""
+    head = "what", "here", "there", "here/there", "here, all rounds", "there, all rounds"
+    made = Table(*head, box=MARKDOWN)
+    for what, unit in {row.what: row.unit for row in here}.items():
+        both = [[row.figure for row in rows if row.what == what] for rows in (here, there)]
+        if all(both):
+            ours, theirs = map(median, both)
+            ratio = f"{ours / theirs:.2f}" if theirs else ""
+            rounds = (" ".join(shown(one, unit) for one in each) for each in both)
+            made.add_row(what, shown(ours, unit), shown(theirs, unit), ratio, *rounds)
+    Console(width=WIDTH).print(made)

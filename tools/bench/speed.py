@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
 from functools import partial
 from itertools import count, islice
 from pathlib import Path
@@ -25,7 +24,6 @@ from .processes import (
     HOST,
     Process,
     bare,
-    beside,
     database,
     environment,
     server,
@@ -35,26 +33,21 @@ from .rows import Percentiles, Row, latencies, percentiles
 from .wire import (
     OUTSTANDING,
     STANDING,
-    STOP,
     Rovers,
     Speaker,
     effect,
     introduced,
     move,
     rate,
-    stops,
 )
 
 WARM_UP, ONE_BY_ONE, MANY = 500, 3_000, 40_000  # commands
 Acks = tuple[Percentiles, float]  # seconds of one, and answers a second
 ACK = m.CommandAck.id
-ZERO = m.SetPositionTargetLocalNed.id
 PAGE = b"x" * 4_096  # bytes of an fsync
 INSERT = "INSERT INTO public.plain (body) VALUES (%s)"
 BODY = "x" * 300  # about the row of a submission
 PACKETS = 60_000
-STOPS = 300
-FLOOD = 5_000  # packets/s
 ROVERS = (1, 20, 100)
 RATE = 40  # packets/s of each rover
 SETTLING, WATCHED = 3.0, 10.0  # s
@@ -144,38 +137,6 @@ def _acknowledged(
         times.append(effect(client, packet, answer, at=client))
     acks = rate(client, client, packed, lambda data: data[7] == answer, live)
     return percentiles(times[WARM_UP:]), acks
-
-
-def stop(tree: Path) -> Iterator[Row]:
-    """STOP → zero setpoint, while the rover floods the server with telemetry; beside without."""
-    found = []
-    for is_flooded in (False, True):
-        with introduced(tree) as (_, client, rover), ExitStack() as stack:
-            if is_flooded:
-                stack.enter_context(beside(_attitudes, rover))
-            times, _ = stops(lambda: stopped(client, rover), count=STOPS)
-        found.append(percentiles(times))
-    calm, flooded = found
-    what = f"STOP → zero setpoint, {FLOOD:,} packets/s"
-    yield Row(f"{what}, p99", flooded.p99, "ms", calm.p99, "without", "≤ 5 ms")
-    yield Row(f"{what}, p50", flooded.p50, "ms", calm.p50, "without")
-
-
-def _attitudes(rover: Rovers) -> None:
-    begin = monotonic()
-    for sent in count():
-        rover.send(m.Attitude(sent & 0xFFFFFF, 0, 0, 0.1, 0, 0, 0))
-        if sent % 10 == 0:
-            sleep(max(0.0, begin + sent / FLOOD - monotonic()))
-
-
-def stopped(client: Speaker, rover: Rovers) -> float:
-    """Return the seconds of a STOP until its zero setpoint is at the rover's socket."""
-    rover.live()
-    client.beat()
-    rover.drain()
-    client.drain()
-    return effect(client, client.encode(STOP), ZERO, at=rover, within=0.25)
 
 
 def forwarding(tree: Path) -> Iterator[Row]:

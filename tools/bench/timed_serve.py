@@ -1,7 +1,7 @@
 """``mav-tasks`` with its arguments, of any revision: at its end it prints when setpoints left.
 
-They are triples as JSON: system id, monotonic time, and the deviation in s from 1/20 s of the time
-since the moving setpoint before. The zero that ends a drive leaves at once and is not counted.
+They are triples as JSON: system id, monotonic time, and the seconds since the moving setpoint
+before. The zero that ends a drive leaves at once and is not counted.
 """
 
 import json
@@ -11,8 +11,7 @@ from collections.abc import Hashable
 from mav_tasks.cli.app import main
 from mav_tasks.links.udp import UdpLink
 
-PERIOD = 0.05  # s
-MOVING = 2 * PERIOD  # s; after a longer interval the stream had ended
+MOVING = 0.1  # s; after a longer interval the stream had ended
 SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
 FORWARD = slice(10 + 16, 10 + 20)  # offset of vx, and of target_system,
 TARGET_SYSTEM = 10 + 50  # in a whole MAVLink 2 packet of it
@@ -31,7 +30,7 @@ def timed(link: UdpLink, peer: Hashable, data: bytes) -> None:
         if any(data[FORWARD]):
             last[rover] = now
             if interval < MOVING:
-                left.append((rover, now, abs(interval - PERIOD)))
+                left.append((rover, now, interval))
 
 
 UdpLink.send = timed  # type: ignore[method-assign, assignment]

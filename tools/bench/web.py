@@ -6,12 +6,12 @@ at the web process to the frame in which the page has painted it.
 """
 
 import gzip
-import json
 import os
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -21,6 +21,7 @@ from playwright.sync_api import sync_playwright
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
 
+from .driving import PERIOD, driven
 from .load import EVENTS, asked, faced, held
 from .processes import HOST, beside, server, simulated_rovers
 from .rows import Row, percentiles
@@ -30,7 +31,6 @@ BROWSERS, ROVERS = 50, 100
 STOPS, LOADS, ROUNDS = 20, 10, 3
 BETWEEN = 1.2  # s between STOPs, after which the server asks for HOLD at once again
 WATCHED = 10.0  # s
-TASK = b'{"goals": [{"kind": "drive", "forward": 0.2, "yaw_rate": 20, "duration": 10}]}'
 CHROMIUM = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 PRESS = """() => {
   const options = {bubbles: true, button: 0, pointerId: 1}, at = Date.now();
@@ -149,21 +149,17 @@ def _painted(tree: Path, browser: Any) -> Row:
 
 def _driven(tree: Path) -> Row:
     """Setpoints of a rover with and without browsers, in turns."""
+
+    @contextmanager
+    def watched(browsers: int, server: int) -> Iterator[None]:
+        with faced(tree, "web", server) as (_, port), beside(held, port, browsers, EVENTS, True):
+            time.sleep(3.0)
+            yield
+
     found: dict[int, list[float]] = {0: [], BROWSERS: []}
-    with (
-        simulated_rovers(1) as rover,
-        server(tree, rover, "--arming=server") as it,
-        faced(tree, "web", it.port) as (_, port),
-    ):
-        it.wait_for("rover 1: found")
-        time.sleep(3.0)
-        api = f"http://{HOST}:{port}/api/v1"
-        for browsers in [*found] * ROUNDS:
-            with beside(held, port, browsers, EVENTS, True) if browsers else nullcontext():
-                task = json.loads(asked(f"{api}/vehicles/1/tasks", TASK))["id"]
-                it.wait_for(rf"task {task} completed")
-                timing = json.loads(asked(f"{api}/tasks/{task}/timing"))
-                found[browsers].append(timing["p99"])
+    for browsers in [*found] * ROUNDS:
+        it = driven(tree, 1, meanwhile=partial(watched, browsers))
+        found[browsers].append(PERIOD + it.errors.p99)
     without, crowd = (median(each) for each in found.values())
     what = f"interval of setpoints, p99, {BROWSERS} browsers"
     return Row(what, crowd, "ms", without, "without", "≤ 1.05×")
