@@ -1,4 +1,4 @@
-"""The yardstick: ``python -m tools.bench.bare PORT [TO]`` echoes datagrams, or forwards them.
+"""The yardstick: ``bare.py [TO]`` echoes datagrams, or forwards them; it prints its port.
 
 It imports nothing else, as asyncio's receive buffers cost half in a process with a larger heap.
 """
@@ -25,15 +25,15 @@ class Forward(asyncio.DatagramProtocol):
         self.out.sendto(data, self.to or addr)
 
 
-async def serve(port: int, to: int = 0) -> None:
+async def serve(to: int = 0) -> None:
     """Echo what comes to a port, or send it to another port."""
     made = asyncio.get_running_loop().create_datagram_endpoint
     out: tuple[Any, ...] = (None, None)
     if to:
         transport, _ = await made(asyncio.DatagramProtocol, local_addr=(HOST, 0))
         out = transport, (HOST, to)
-    await made(lambda: Forward(*out), local_addr=(HOST, port))
-    print("ready", flush=True)
+    transport, _ = await made(lambda: Forward(*out), local_addr=(HOST, 0))
+    print("at", transport.get_extra_info("sockname")[1], flush=True)
     await asyncio.Event().wait()
 
 

@@ -1,5 +1,6 @@
 """Evenness of 20 Hz setpoints: of one server with 1 to 240 rovers, and of gateways of a fleet."""
 
+import json
 import math
 import time
 from collections import defaultdict
@@ -77,7 +78,7 @@ def driven(
         grown = servers[0].memory() - memory
     errors: dict[float, list[float]] = defaultdict(list)
     for it in servers:
-        for rover, at, interval in it.results():
+        for rover, at, interval in json.loads(it.said.splitlines()[-1]):
             if began <= at < began + SECONDS:
                 errors[rover].append(abs(interval - PERIOD))
     worst = max((percentiles(each).p99 for each in errors.values()), default=math.inf)

@@ -7,6 +7,7 @@ from itertools import cycle
 from pathlib import Path
 from select import select
 from statistics import median
+from time import process_time
 
 from mav_tasks.basics.clock import boot_time
 from mav_tasks.fleet.exchange import Arrived
@@ -15,7 +16,7 @@ from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import parse
 from mav_tasks.store.postgres.session import Session
 
-from .processes import cpu_seconds, database
+from .processes import database
 from .rows import Row, percentiles
 from .speed import timed
 
@@ -74,7 +75,7 @@ def mail(url: str, name: str, names: list[str], rate: float) -> tuple[float, flo
     while not carrier.peers >= set(others):
         receive(0.01)
     receive(1.0)  # the others meet each other
-    used, whom, now = cpu_seconds("self"), cycle(others), boot_time()
+    used, whom, now = process_time(), cycle(others), boot_time()
     next_stop, end = now, now + SECONDS
     next_one = now if rate else end
     while (now := boot_time()) < end:
@@ -86,5 +87,5 @@ def mail(url: str, name: str, names: list[str], rate: float) -> tuple[float, flo
     while boot_time() < end + AFTER:
         receive(AFTER)
     carrier.close()
-    spent = cpu_seconds("self") - used
+    spent = process_time() - used
     return percentiles(found[0]).p99, median(found[1] or [0.0]), len(found[1]), spent

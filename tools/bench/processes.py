@@ -4,17 +4,17 @@ A server is ``mav-tasks serve`` of any revision: ``tree`` is the folder of its f
 sees the user's configuration, keys or store.
 """
 
-import json
 import os
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import clock_gettime
 
 from rover_sim.postgres import installed
 from tests.kit.postgres import PostgresServer
@@ -72,11 +72,6 @@ class Process:
         """Return the size of files in its folder, in bytes."""
         return sum(each.stat().st_size for each in self.folder.glob(pattern))
 
-    def results(self) -> list[list[float]]:
-        """Return what it printed as JSON in its last line, once it has ended."""
-        found: list[list[float]] = json.loads(self.said.splitlines()[-1])
-        return found
-
 
 def environment(tree: Path) -> dict[str, str]:
     """Return an environment with the modules of a tree, whose bytecode is kept, as installed."""
@@ -86,8 +81,8 @@ def environment(tree: Path) -> dict[str, str]:
 
 
 @contextmanager
-def process(*arguments: str, tree: Path = ROOT, ready: str = "") -> Iterator[Process]:
-    """Run Python for a ``with`` block, with the modules of a tree, once it says it is ready."""
+def process(*arguments: str, tree: Path = ROOT) -> Iterator[Process]:
+    """Run Python for a ``with`` block, with the modules of a tree."""
     with TemporaryDirectory(dir=BUILD) as name:
         folder = Path(name)
         homes = {f"XDG_{kind}_HOME": name for kind in ("CONFIG", "DATA", "STATE")}
@@ -101,8 +96,6 @@ def process(*arguments: str, tree: Path = ROOT, ready: str = "") -> Iterator[Pro
             )
         it = Process(started.pid, folder)
         try:
-            if ready:
-                it.wait_for(ready)
             yield it
         finally:
             started.terminate()
@@ -125,10 +118,12 @@ def beside(do: Callable[..., object], *arguments: object) -> Iterator[None]:
         it.join()
 
 
-def bare(*ports: int) -> AbstractContextManager[Process]:
-    """Run the yardstick: an echo, or a forwarder to the second port."""
-    words = (str(Path(__file__).with_name("bare.py")), *map(str, ports))
-    return process(*words, ready="ready\n")
+@contextmanager
+def bare(*to: int) -> Iterator[Process]:
+    """Run the yardstick for a ``with`` block: an echo, or a forwarder to a port."""
+    with process(str(Path(__file__).with_name("bare.py")), *map(str, to)) as it:
+        it.port = int(it.wait_for(r"at (\d+)\n"))
+        yield it
 
 
 @contextmanager
@@ -137,8 +132,8 @@ def server(
 ) -> Iterator[Process]:
     """Run a server for a ``with`` block, for a client's port and a rover's.
 
-    With ``is_timed``, its results are triples: a rover's system id, when a moving setpoint to it
-    left, and the seconds since the one before.
+    With ``is_timed``, its last line is triples as JSON: a rover's system id, when a moving setpoint
+    to it left, and the seconds since the one before.
     """
     (port,) = free_udp_ports(1)
     links = f"--client=udpin:{HOST}:{port}", f"--vehicle=udpout:{HOST}:{rover}"
@@ -169,10 +164,6 @@ def database() -> Iterator[PostgresServer]:
         made.close()
 
 
-def cpu_seconds(*pids: int | str) -> float:
+def cpu_seconds(*pids: int) -> float:
     """Return the processor time that processes have used."""
-    ticks = 0
-    for pid in pids:
-        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-        ticks += int(fields[11]) + int(fields[12])
-    return ticks / os.sysconf("SC_CLK_TCK")
+    return sum(clock_gettime(~pid << 3 | 2) for pid in pids)  # clock_getcpuclockid(3) of Linux

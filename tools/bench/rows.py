@@ -1,7 +1,7 @@
 """A figure beside a yardstick of the same run on the same machine, and tables of them."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median, quantiles
 from typing import NamedTuple
@@ -64,14 +64,6 @@ def shown(value: float, unit: str) -> str:
     """Return a value with three digits or more, and its unit."""
     scaled = value * SCALES.get(unit, 1.0)
     return f"{scaled:,.0f} {unit}" if abs(scaled) >= 100 else f"{scaled:.3g} {unit}"
-
-
-def latencies(
-    what: str, ours: Percentiles, beside: Percentiles, of: str, goal: str = "", unit: str = "µs"
-) -> Iterator[Row]:
-    """Yield the rows of p50, which has the goal, and of p99."""
-    yield Row(f"{what}, p50", ours.p50, unit, beside.p50, of, goal)
-    yield Row(f"{what}, p99", ours.p99, unit, beside.p99, of)
 
 
 def show(rows: Sequence[Row]) -> None:

@@ -153,7 +153,7 @@ def _driven(tree: Path) -> Row:
     @contextmanager
     def watched(browsers: int, server: int) -> Iterator[None]:
         with faced(tree, "web", server) as (_, port), beside(held, port, browsers, EVENTS, True):
-            time.sleep(3.0)
+            time.sleep(1.0)
             yield
 
     found: dict[int, list[float]] = {0: [], BROWSERS: []}
