@@ -1,8 +1,8 @@
 """A real Chromium, driven by playwright; without one these tests are skipped, and say so."""
 
 import os
-import shutil
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,8 @@ import pytest
 from tests.kit.processes import Stand
 from tests.kit.web import Web, served
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is missing")
+pytest.importorskip("playwright.sync_api", reason="playwright is missing")
 
-BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 #: what a browser itself logs for an answer that a test provokes
 OF_THE_BROWSER = "Failed to load resource"
 
@@ -25,14 +24,14 @@ def chromium() -> Iterator[Any]:
     Not of a session: while playwright is open it runs an event loop in this thread, and tests of
     other modules begin loops of their own.
     """
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        pytest.skip("no Chromium: tools/setup --browser installs it, as root with apt-get")
-    options = ["--no-sandbox"] if os.geteuid() == 0 else []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=options)
+    from tests.kit.chromium import running
+
+    with ExitStack() as stack:
+        try:
+            browser = stack.enter_context(running())
+        except FileNotFoundError as missing:
+            pytest.skip(str(missing))
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,6 @@ at the web process to the frame in which the page has painted it.
 """
 
 import gzip
-import os
-import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,10 +14,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from playwright.sync_api import sync_playwright
-
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
+from tests.kit import chromium
 
 from .driving import PERIOD, driven
 from .load import EVENTS, asked, faced, held
@@ -31,7 +28,6 @@ BROWSERS, ROVERS = 50, 100
 STOPS, LOADS, ROUNDS = 20, 10, 3
 BETWEEN = 1.2  # s between STOPs, after which the server asks for HOLD at once again
 WATCHED = 10.0  # s
-CHROMIUM = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 PRESS = """() => {
   const options = {bubbles: true, button: 0, pointerId: 1}, at = Date.now();
   document.getElementById('stop-all').dispatchEvent(new PointerEvent('pointerdown', options));
@@ -57,12 +53,7 @@ EventSource.prototype.addEventListener = function (kind, listener, ...rest) {
 
 def measure(tree: Path) -> Iterator[Row]:
     """Size, first paint, STOP in the page, packet → pixel, setpoints; with 50 browsers."""
-    path = next(filter(None, map(shutil.which, CHROMIUM)), None)
-    if path is None:
-        raise OSError("no Chromium: tools/setup --browser installs it")
-    options = ["--no-sandbox"] if os.geteuid() == 0 else []
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=options)
+    with chromium.running() as browser:
         with Rovers() as rover, server(tree, rover.port) as it, faced(tree, "web", it.port) as web:
             rover.connect()
             yield from _loads(browser, f"http://{HOST}:{web[1]}/", rover)
@@ -71,7 +62,6 @@ def measure(tree: Path) -> Iterator[Row]:
             yield Row(f"{what}, p50", median(crowd), "ms", median(alone), "with one")
             yield Row(f"{what}, longest", max(crowd), "ms", max(alone), "with one", "≤ 50 ms")
         yield _painted(tree, browser)
-        browser.close()
     yield _driven(tree)
 
 

@@ -4,7 +4,6 @@ They show a real server and a simulated rover in a real Chromium, so each run's 
 take them again when the page has changed, and look at them. `.venv/bin/python` runs this file.
 """
 
-import shutil
 import sys
 from io import BytesIO
 from pathlib import Path
@@ -12,11 +11,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from PIL import Image
-from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tests.kit import chromium  # noqa: E402
 from tests.kit.web import Web, served  # noqa: E402
 
 FOLDER = ROOT / "mav_tasks/guide/images"
@@ -56,7 +55,5 @@ def take(page: Any, web: Web) -> None:
 
 
 if __name__ == "__main__":
-    with TemporaryDirectory() as folder, served(Path(folder)) as (_, web), sync_playwright() as it:
-        path = shutil.which("chromium-headless-shell")
-        with it.chromium.launch(executable_path=path, args=["--no-sandbox"]) as browser:
-            take(browser.new_page(viewport={"width": 1280, "height": 820}, locale="en-GB"), web)
+    with TemporaryDirectory() as name, served(Path(name)) as (_, it), chromium.running() as browser:
+        take(browser.new_page(viewport={"width": 1280, "height": 820}, locale="en-GB"), it)
