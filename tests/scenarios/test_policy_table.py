@@ -43,8 +43,8 @@ class Word(NamedTuple):
 
 def tables() -> tuple[str, str]:
     """Return what the table has about commands, and about messages."""
-    commands, _, messages = full_policy().partition("\nCommands:")[2].partition("\nMessages:")
-    return commands, messages
+    policy = full_policy()
+    return "\n".join(policy["commands"]), "\n".join(policy["messages"])
 
 
 def words() -> Iterator[Word]:
@@ -166,7 +166,7 @@ def test_each_message_and_command_of_mavlink_is_judged_by_name() -> None:
 def test_what_moves_a_rover_is_for_no_observer_and_nobody_s_at_any_time() -> None:
     rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
-        for line in "".join(tables()).splitlines()
+        for line in "\n".join(tables()).splitlines()
         if line.startswith(("| go", "| motion", "| manual", "| action"))
     ]
     assert len(rows) > 20

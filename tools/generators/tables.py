@@ -3,7 +3,7 @@
 The short ones stand in the wire contract; the full ones have every command and message.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import chain
 
@@ -23,23 +23,12 @@ from mav_tasks.engine.policy import messages as of_messages
 from mav_tasks.engine.policy.commands import ACTS, COMMANDS, UNKNOWN
 
 KINDS = list(Kind)
-HEAD = "| kind | lowest role | purpose | forwarded | commands or messages |\n|---|---|---|---|---|"
 NAMELESS = replace(UNKNOWN, name="all others")
 #: kinds that have a plainer name in the document
 NAMES = {Kind.STICKS: "manual", Kind.WISH: "setting", Kind.TELL: "report"}
 #: a row of the short policy names so many, else it says what they do
 MOST_NAMES = 3
 HANDLED = "handled"
-
-LEGEND = """\
-- *handled*: by the server at `(N, 191)`, and at `(N, 1)` if it claims it there (`rules.claim`). The
-  rule after *else* applies at other components of the vehicle, and with `claim` off.
-- *in control*: the client has requested GUIDED or OFFBOARD since the last halt, the vehicle is
-  armed, and every task that has started is over.
-- *during a task*: while the server takes control, drives, or hands the vehicle back.
-- *bound*: can change more than motion.
-- *not counted*: does not count towards the rate limit of requests.
-"""
 
 Group = tuple[Row, list[str]]
 
@@ -65,27 +54,13 @@ def short_policy() -> str:
     return "\n".join([*lines, ""])
 
 
-def full_policy() -> str:
-    """Return the tables of kinds, commands and messages, and a legend; equal rows share a line."""
-    kinds = [f"| {_name(kind)} | {kind.value} |" for kind in KINDS]
-    commands = _lines(of_commands.COMMANDS.items(), (*of_commands.BY_WORDS, NAMELESS))
-    messages = _lines(of_messages.MESSAGES.items(), (*of_messages.BY_WORDS, NAMELESS))
-    parts = ["| kind | a message of this kind |\n|---|---|", *kinds]
-    parts += [
-        "",
-        LEGEND,
-        "Commands:",
-        "",
-        HEAD,
-        *commands,
-        "",
-        "Messages:",
-        "",
-        HEAD,
-        *messages,
-        "",
-    ]
-    return "\n".join(parts)
+def full_policy() -> dict[str, list[str]]:
+    """Return the lines of the tables of kinds, commands and messages; equal rows share a line."""
+    return {
+        "kinds": [f"| {_name(kind)} | {kind.value} |" for kind in KINDS],
+        "commands": _lines(of_commands.COMMANDS, of_commands.BY_WORDS),
+        "messages": _lines(of_messages.MESSAGES, of_messages.BY_WORDS),
+    }
 
 
 def _short(about: str, names: list[str]) -> str:
@@ -101,14 +76,13 @@ def _kind(row: Row) -> int:
     return KINDS.index(row.kind)
 
 
-def _lines(numbered: Iterable[tuple[int, Row]], others: Iterable[Row]) -> Iterator[str]:
+def _lines(numbered: Mapping[int, Row], others: Iterable[Row]) -> list[str]:
     groups: dict[Row, list[str]] = {}
-    for number, row in sorted(numbered, key=lambda pair: pair[0]):
+    for number, row in sorted(numbered.items()):
         groups.setdefault(replace(row, name=""), []).append(f"{number} {row.name}")
-    for row in others:
+    for row in (*others, NAMELESS):
         groups.setdefault(replace(row, name=""), []).append(row.name)
-    for row, names in sorted(groups.items(), key=_order):
-        yield _line(row, names)
+    return [_line(row, names) for row, names in sorted(groups.items(), key=_order)]
 
 
 def _order(group: Group) -> tuple[bool, int, int, str]:
