@@ -90,15 +90,19 @@ def environment_with(**variables: str) -> dict[str, str]:
 
 @contextmanager
 def process(
-    *arguments: str, folder: Path, name: str, python: str = sys.executable
+    *arguments: str,
+    folder: Path,
+    name: str,
+    python: str = sys.executable,
+    env: dict[str, str] | None = None,
 ) -> Iterator[Process]:
     """Run a Python process for a ``with`` block; kill it if it is still running.
 
     Without a store option, a server's store is in ``folder``; it never uses the user's store,
-    configuration or keys.
+    configuration or keys. ``env`` is another environment.
     """
     output = folder / f"{name}.log"
-    env = environment_with(
+    env = env or environment_with(
         MAV_TASKS_STORE=str(folder / f"{name}.sqlite3"),
         XDG_CONFIG_HOME=str(folder),
         XDG_STATE_HOME=str(folder),

@@ -9,6 +9,8 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.kit.processes import wait_until
+
 from .processes import Process, cpu_seconds, database, server, simulated_rovers
 from .rows import Percentiles, Row, percentiles
 from .wire import STATION, Speaker, move
@@ -68,7 +70,7 @@ def driven(
         for index, it in enumerate(servers):
             _drive(it, 1 + index * rovers, rovers)
         stack.enter_context(meanwhile(servers[0].port))
-        pids = [it.pid for it in servers], base.pids() if base else []
+        pids = [it.popen.pid for it in servers], base.pids() if base else []
         memory, began = servers[0].memory(), time.monotonic()
         before = [cpu_seconds(*each) for each in pids]
         time.sleep(SECONDS)
@@ -90,7 +92,7 @@ def driven(
 
 def _drive(it: Process, first: int, rovers: int) -> None:
     """Submit a long move to each rover, once all have sent a position."""
-    it.wait_for(r"rover \d+: found", count=rovers)
+    wait_until(lambda: it.text.count(": found") >= rovers, within=20.0, what=f"{rovers} rovers")
     time.sleep(3.0)
     with Speaker(to=it.port) as client:
         client.send(STATION)

@@ -11,13 +11,11 @@ import re
 import resource
 import select
 import socket
-import subprocess
-import sys
 import time
 import tty
 import urllib.request
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -30,9 +28,10 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.signing import signed, timestamp_at
 from tests.kit.processes import free_tcp_ports
+from tests.kit.web import add_key, key_in, ring_of
 
 from .floods import from_clients
-from .processes import CLI, HOST, Process, beside, environment, process, server, simulated_rovers
+from .processes import CLI, HOST, Process, beside, process, server, simulated_rovers
 from .rows import Row, percentiles
 from .wire import STOP, Speaker, effect, stops
 
@@ -40,7 +39,6 @@ SECONDS = 5.0  # of each load
 APART = 0.1  # s between STOPs by MAVLink, each of another address
 APART_HTTP = 0.7  # s; one client's STOPs that are closer wait, so that they are no copies
 PATIENCE = 2.0  # s without an acknowledgement: lost
-SECRET = b"an operator's key of 32 bytes: ."
 ACKNOWLEDGED = re.compile(rb"\xfd.{6}\x4d\0\0" + STOP.command.to_bytes(2, "little"), re.DOTALL)
 LARGE = b'{"text": "x", "more": [' + b'{"a":1},' * 280_000 + b"1]}"
 TASK = b'{"goals": [{"kind": "wait", "duration": 1}], "delay": 5000}'
@@ -171,7 +169,7 @@ def _loaded(
     apart: float = APART,
 ) -> Iterator[Row]:
     def figures() -> tuple[float, ...]:
-        return it.memory() / 1e6, it.seconds(), it.size("log") / 1e3, it.size("*sqlite*") / 1e3
+        return it.memory() / 1e6, it.seconds(), it.size("*.log") / 1e3, it.size("*sqlite*") / 1e3
 
     for kind, (do, *arguments) in {"no load": (None,), **kinds}.items():
         before, began = figures(), time.monotonic()
@@ -201,13 +199,12 @@ def _of_links(tree: Path) -> Iterator[Row]:
     tty.setraw(near)
     closed, opened, metrics = free_tcp_ports(3)
     with ExitStack() as stack:
-        ring = Path(stack.enter_context(TemporaryDirectory()), "keys.toml")
-        words = ("keys", "add", "anna", "--role=operator", "--hex", f"--keys={ring}")
-        key = f"{SECRET.hex()}\n".encode()
-        subprocess.run([sys.executable, *CLI, *words], env=environment(tree), input=key, check=True)
+        folder = Path(stack.enter_context(TemporaryDirectory()))
+        add_key(folder, "anna", "operator")
+        key = key_in(ring_of(folder), "anna").secret
         links = [f"tcpin:{HOST}:{closed}?unsigned=refuse", f"tcpin:{HOST}:{opened}"]
         links.append(f"serial:{os.ttyname(near)}:921600")
-        options = [f"--metrics={HOST}:{metrics}", f"--keys={ring}"]
+        options = [f"--metrics={HOST}:{metrics}", f"--keys={ring_of(folder)}"]
         it = stack.enter_context(_server(tree, *(f"--client={each}" for each in links), *options))
         client = stack.enter_context(Speaker(to=it.port))
 
@@ -218,7 +215,7 @@ def _of_links(tree: Path) -> Iterator[Row]:
         yield from _loaded("UDP link", STRANGERS, it, by_udp, it.port)
         yield from _loaded("serial line", {"noise": (noise,)}, it, by_udp, far)
         yield from _loaded("metrics", {**SILENT, **HALF}, it, by_udp, metrics)
-        for name, port, secret in (("signed", closed, SECRET), ("unsigned", opened, b"")):
+        for name, port, secret in (("signed", closed, key), ("unsigned", opened, b"")):
             dial = partial(socket.create_connection, (HOST, port), PATIENCE)
             with dial() as known:
                 stop = partial(_stop_by_tcp, partial(nullcontext, known), secret)
@@ -233,7 +230,7 @@ _STOPS = (
 )
 
 
-def _stop_by_tcp(dial: Callable[[], AbstractContextManager[socket.socket]], secret: bytes) -> float:
+def _stop_by_tcp(dial: Callable[[], Any], secret: bytes) -> float:
     """Return the seconds of a STOP until its acknowledgement comes; infinity if it does not."""
     packet, came, begin = next(_STOPS), b"", time.perf_counter()
     if secret:
@@ -252,7 +249,7 @@ def faced(tree: Path, face: str, server: int) -> Iterator[tuple[Process, int]]:
     """Run the page, or MCP over HTTP, for a ``with`` block; yield it, and its port."""
     options = [f"--http={HOST}:0"] if face == "mcp" else ["--store=", f"--listen={HOST}:0"]
     with process(*CLI, face, *options, f"--server=udpout:{HOST}:{server}", tree=tree) as it:
-        yield it, int(it.wait_for(rf"(?:page:|use) http://{HOST}:(\d+)"))
+        yield it, int(it.wait_for(rf"(?:page:|use) http://{HOST}:(\d+)")[1])
 
 
 def asked(url: str, body: bytes | None = None, headers: Mapping[str, str] = JSON) -> bytes:

@@ -5,11 +5,8 @@ sees the user's configuration, keys or store.
 """
 
 import os
-import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -17,14 +14,13 @@ from tempfile import TemporaryDirectory
 from time import clock_gettime
 
 from rover_sim.postgres import installed
+from tests.kit import processes
 from tests.kit.postgres import PostgresServer
-from tests.kit.processes import free_udp_ports, wait_until
+from tests.kit.processes import free_udp_ports
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build"  # on the project's disk
 HOST = "127.0.0.1"
-START_WITHIN = 20.0  # s
-END_WITHIN = 10.0  # s
 CLI = ("-P", "-m", "mav_tasks.cli")
 TIMED_CLI = ("-P", str(Path(__file__).with_name("timed_serve.py")))
 #: as many commands as a measurement has, at any rate
@@ -38,39 +34,24 @@ UNLIMITED = [
 
 
 @dataclass
-class Process:
+class Process(processes.Process):
     """A process in a folder of its own; ``port`` is a server's, for clients."""
 
-    pid: int
-    folder: Path
     port: int = 0
     said: str = ""  # at its end
 
-    def text(self) -> str:
-        """Return what it has written so far."""
-        return (self.folder / "log").read_text(encoding="utf-8", errors="replace")
-
-    def wait_for(self, pattern: str, *, count: int = 1) -> str:
-        """Wait until it has written that; return the last group, or match."""
-        found = wait_until(
-            lambda: (found := re.findall(pattern, self.text()))[count - 1 :] and found,
-            within=START_WITHIN,
-            what=lambda: f"{pattern} in {self.text()[-2000:]}",
-        )
-        return str(found[-1])
-
     def seconds(self) -> float:
         """Return the processor time that it has used."""
-        return cpu_seconds(self.pid)
+        return cpu_seconds(self.popen.pid)
 
     def memory(self) -> int:
         """Return its resident memory, in bytes."""
-        pages = Path(f"/proc/{self.pid}/statm").read_text(encoding="ascii").split()[1]
+        pages = Path(f"/proc/{self.popen.pid}/statm").read_text(encoding="ascii").split()[1]
         return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
     def size(self, pattern: str) -> int:
         """Return the size of files in its folder, in bytes."""
-        return sum(each.stat().st_size for each in self.folder.glob(pattern))
+        return sum(each.stat().st_size for each in self.output.parent.glob(pattern))
 
 
 def environment(tree: Path) -> dict[str, str]:
@@ -84,26 +65,15 @@ def environment(tree: Path) -> dict[str, str]:
 def process(*arguments: str, tree: Path = ROOT) -> Iterator[Process]:
     """Run Python for a ``with`` block, with the modules of a tree."""
     with TemporaryDirectory(dir=BUILD) as name:
-        folder = Path(name)
         homes = {f"XDG_{kind}_HOME": name for kind in ("CONFIG", "DATA", "STATE")}
-        with (folder / "log").open("wb") as log:
-            started = subprocess.Popen(
-                [sys.executable, *arguments],
-                env={**environment(tree), **homes},
-                cwd=folder,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-            )
-        it = Process(started.pid, folder)
-        try:
-            yield it
-        finally:
-            started.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                started.wait(END_WITHIN)
-            started.kill()
-            started.wait()
-            it.said = it.text()
+        env = {**environment(tree), **homes}
+        with processes.process(*arguments, folder=Path(name), name="its", env=env) as started:
+            it = Process(started.popen, started.output)
+            try:
+                yield it
+            finally:
+                it.end()
+                it.said = it.text
 
 
 @contextmanager
@@ -122,7 +92,7 @@ def beside(do: Callable[..., object], *arguments: object) -> Iterator[None]:
 def bare(*to: int) -> Iterator[Process]:
     """Run the yardstick for a ``with`` block: an echo, or a forwarder to a port."""
     with process(str(Path(__file__).with_name("bare.py")), *map(str, to)) as it:
-        it.port = int(it.wait_for(r"at (\d+)\n"))
+        it.port = int(it.wait_for(r"at (\d+)\n")[1])
         yield it
 
 
@@ -156,12 +126,9 @@ def simulated_rovers(count: int, *, first: int = 1) -> Iterator[int]:
 @contextmanager
 def database() -> Iterator[PostgresServer]:
     """Run a database server for a ``with`` block, as durable as a user's."""
-    made = PostgresServer(installed())
-    try:
+    with closing(PostgresServer(installed())) as made:
         made.start()
         yield made
-    finally:
-        made.close()
 
 
 def cpu_seconds(*pids: int) -> float:
