@@ -3,7 +3,7 @@
 from bisect import bisect_left
 from dataclasses import dataclass
 from itertools import pairwise
-from math import hypot, remainder, tau
+from math import hypot, inf, remainder, tau
 
 WINDOW = 0.5  # s; a displacement over this time gives a speed without the noise of one sample
 STANDS = 0.05  # m/s; the speed that real rovers report at rest wanders by 0.03 m/s (traces)
@@ -77,8 +77,9 @@ class Track:
         return moving - time
 
     def travelled(self, time: float) -> float:
-        """Return the distance between the place at ``time`` and the last one, m."""
-        return self.last.apart(self.since(time)[0])
+        """Return how far it has been from its place at ``time``, m, also if it came back."""
+        places = self.between(time, inf)
+        return max((place.apart(places[0]) for place in places), default=0.0)
 
     def _motion(self, window: float = WINDOW) -> tuple[float, float]:
         """Return speed and turning over the last ``window``, m/s and rad/s."""

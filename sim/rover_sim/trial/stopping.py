@@ -59,13 +59,13 @@ async def _stop_by(way: str, driver: Driver, session: Session) -> float | None:
     await driver.stream(SPEED, RUN_UP)
     if track.speed() < SPEED * REACHED:
         return None
-    begun = track.last
+    begun = track.last.time
     if way == "HOLD":
         await driver.hold()
         await asyncio.sleep(BRAKES)
     else:
         await driver.zeros(BRAKES)
-    return track.last.apart(begun)
+    return track.travelled(begun)  # on zeros a PX4 car drives a loop
 
 
 def lacks_distance(session: Session) -> str:
@@ -84,10 +84,11 @@ async def stop(session: Session) -> Result:
             task = await session.submit(Drive(SPEED, 0.0, 3 * RUN_UP))
             await session.running_since(task, 0.1)
             await asyncio.sleep(RUN_UP)
-            begun = session.track.last
+            begun = session.track.last.time
             await session.client.stop()
             await asyncio.sleep(BRAKES)
-            metres.append((await session.rest()).apart(begun))
+            await session.rest()
+            metres.append(session.track.travelled(begun))
         except Refused as refused:
             words = str(refused)
         await session.clean()
