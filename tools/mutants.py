@@ -177,7 +177,7 @@ class Watch:
 
 
 def inside(tests: list[str], changes: Changes) -> Results | None:
-    """Run tests with changed modules, without output; return the results, None if there are none.
+    """Run tests with changed modules, silently; return the results, or None if pytest failed.
 
     It changes its process, and may end it.
     """

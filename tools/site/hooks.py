@@ -1,4 +1,4 @@
-"""What MkDocs lacks for the site: pages from the whole repository, and from its code; diagrams.
+"""What MkDocs lacks for the site: pages from the whole repository, diagrams without a script.
 
 Each page has the path that it has in the repository, so that links between pages need no change;
 MkDocs checks them. A link to a file that is no page leads below ``Source`` of ``[project.urls]``;
@@ -7,12 +7,9 @@ ask another host.
 """
 
 import re
-import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from posixpath import basename, dirname, join, normpath
-from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from mermaidx import render
@@ -20,28 +17,10 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.plugins import get_plugin_logger
 from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
-from typer.main import get_command
 
-import mav_tasks
-from mav_tasks.cli.app import app
-from mav_tasks.cli.lazy import LazyCommand
-from mav_tasks.client.aio import Client
-from mav_tasks.config.key_ring.watch import RingWatch
-from mav_tasks.config.setting_keys.literals import in_digits, literal
-from mav_tasks.config.settings import KEYS, ServerSettings
-from mav_tasks.tasks.lifecycle import TaskReason, words_of
-from mav_tasks.web.application import operations_of
-from mav_tasks.web.live import Live
-from mav_tasks.web.openapi import document_of
-from mav_tasks.web.services import Services
-from mav_tasks.web.sessions import Sessions
-from mav_tasks.web.users import Users
+import reference
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tools"))
-
-from generators.tables import full_plans, full_policy  # noqa: E402
-
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 #: no ``repo_url`` of MkDocs: with one, pages would ask GitHub
@@ -61,7 +40,7 @@ templates = Environment(
 
 def on_files(files: Files, config: MkDocsConfig) -> None:
     """Put the files that match into ``nav``; add them, and the pictures of the guide."""
-    shown = _shown()
+    shown = reference.shown()
     paths = _matching("mav_tasks/guide/images/*")
     for section in config.nav or []:
         for title, patterns in section.items():
@@ -112,45 +91,3 @@ def _matching(pattern: str) -> list[str]:
     found = [path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern)]
     found.sort(key=lambda name: (name not in README, README.find(name), name))
     return found if found or "*" in pattern else [pattern]
-
-
-def _shown() -> dict[str, Any]:
-    """Return what the templates of the reference name."""
-    return {
-        "exported": mav_tasks._HOMES,
-        "reasons": TaskReason,
-        "words_of": words_of,
-        "settings": KEYS.values(),
-        "defaults": ServerSettings(),
-        "literal": literal,
-        "in_digits": in_digits,
-        "commands": list(_commands(get_command(app), "mav-tasks", None)),
-        "api": document_of(operations_of(_services())),
-        "policy": full_policy(),
-        "plans": full_plans(),
-    }
-
-
-def _commands(command: Any, name: str, parent: Any) -> Iterator[dict[str, Any]]:
-    if isinstance(command, LazyCommand):
-        command = command.load()
-    context = command.context_class(command, info_name=name, parent=parent)
-    usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
-    records = (each.get_help_record(context) for each in command.get_params(context))
-    yield {
-        "name": context.command_path,
-        "usage": usage,
-        "help": command.help,
-        "options": [record for record in records if record and "--help" not in record[0]],
-        "epilog": command.epilog,
-    }
-    for each in getattr(command, "commands", {}).values():
-        yield from _commands(each, each.name, context)
-
-
-def _services() -> Services:
-    """Return services as of a web process that has not begun: nothing is opened."""
-    client = Client()
-    ring = RingWatch(Path(), None)
-    users = Users(ring, client, server="", own_key=None, connect=lambda _key: client)
-    return Services(client, Live(client, "", server=""), users, Sessions(users), "", "")
