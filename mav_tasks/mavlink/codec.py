@@ -54,7 +54,10 @@ class Decoder:
             self.counts.corrupt += 1
             return None
         self.counts.decoded += 1
-        return layout.message(raw[start:end])
+        size, payload = layout.struct.size, raw[start:end]
+        if end - start != size:  # a short payload is filled with zeros, a long one is cut off
+            payload = payload[:size].ljust(size, b"\0")
+        return layout.message(*layout.order(layout.struct.unpack(payload)))
 
 
 class Packer:

@@ -17,24 +17,18 @@ _Values = Sequence[Any]
 class Layout:
     """The wire layout of one message class."""
 
-    __slots__ = ("_message", "_order", "crc_extra", "struct", "values")
+    __slots__ = ("crc_extra", "message", "order", "struct", "values")
 
     def __init__(self, message: type[Message]) -> None:
-        self._message = message
+        self.message = message
         self.struct = message.unpacker
         self.crc_extra = bytes((message.crc_extra,))
         is_plain = sum(message.lengths) == len(message.lengths)
         has_text = "char" in message.fieldtypes
-        self._order = _orderly(message, is_plain=is_plain, has_text=has_text)
+        #: gives the fields of a message, as its class takes them, of the values in wire order
+        self.order = _orderly(message, is_plain=is_plain, has_text=has_text)
         #: gives a message's values in wire order, arrays flattened
         self.values = _getter(message, is_plain=is_plain)
-
-    def message(self, payload: bytes) -> Message:
-        """Return the message; a short payload is filled with zeros, a long one is cut off."""
-        size = self.struct.size
-        if len(payload) != size:
-            payload = payload[:size].ljust(size, b"\0")
-        return self._message(*self._order(self.struct.unpack(payload)))
 
 
 def _orderly(

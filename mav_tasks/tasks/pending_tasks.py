@@ -25,7 +25,7 @@ from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.cron import utc_text
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
-from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
+from mav_tasks.tasks.queue import Rank, TaskQueue, rank_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.repetition import (
     CORRECTION,
@@ -110,7 +110,9 @@ class PendingTasks:
         """Return a task's rank among the ready ones; for an active task, the rank it would have."""
         if waiter := self._waiters.get(task.id):
             return waiter.rank
-        return self._most_urgent(task.id, self._own_rank(task, task.submitted_at))
+        came_at, aging = task.submitted_at, self._settings.queueing.aging
+        own = rank_of(task.terms, came_at=came_at, task_id=task.id, aging=aging)
+        return self._most_urgent(task.id, own)
 
     # arrival
 
@@ -119,8 +121,9 @@ class PendingTasks:
         queueing = self._settings.queueing
         if sum(self._registry.counts[draft.vehicle][: S.STARTING]) >= queueing.capacity:
             raise Rejection(R.QUEUE_FULL, f"queue full: {queueing.capacity} tasks wait")
-        if self._of_owner[draft.submitter.owner] >= queueing.quota:
-            raise Rejection(R.QUOTA, f"quota: this client has {queueing.quota} waiting tasks")
+        quota = queueing.quota
+        if len(self._waiters) >= quota and self.count_of(draft.submitter) >= quota:
+            raise Rejection(R.QUOTA, f"quota: this client has {quota} waiting tasks")
         if draft.terms.after:
             self._check(draft.terms.after)
         return self._add(draft, now=now)
@@ -130,9 +133,9 @@ class PendingTasks:
         is_met = bool(after) and self._stands(after) is S.COMPLETED
         state = self._state_by(draft.terms, is_met=is_met, now=now)
         task = self._registry.submit(draft, state=state, now=now)
-        self._enter(task, now=now)
+        waiter = self._enter(task, now=now)
         if state is S.QUEUED:  # wakes nobody: it is not durable yet
-            self._queues[task.vehicle].put(self._entry(task))
+            self._queues[task.vehicle].put(task.id, waiter.rank, task.terms)
         return task
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
@@ -144,10 +147,11 @@ class PendingTasks:
             self._enter(task, now=came_at)
             if task.id in self._dependents:  # a modification may have put dependents first
                 self._lift(task.id)
-        ready: dict[int, list[Entry]] = {}
+        ready: dict[int, list[tuple[TaskId, Rank, Terms]]] = {}
         for task in waiting:
             if task.state is S.QUEUED and self._wanted(task, now=now) is S.QUEUED:
-                ready.setdefault(task.vehicle, []).append(self._entry(task))
+                entry = task.id, self._waiters[task.id].rank, task.terms
+                ready.setdefault(task.vehicle, []).append(entry)
         for vehicle, entries in ready.items():
             self._queues[vehicle].put_all(entries)
         for task in waiting:
@@ -159,14 +163,16 @@ class PendingTasks:
                 self._settle(task, now=now)
         self._look_again(now=now)
 
-    def _enter(self, task: Task, *, now: float) -> None:
-        own = self._own_rank(task, now)
-        self._waiters[task.id] = _Waiter(now, own, own)
+    def _enter(self, task: Task, *, now: float) -> _Waiter:
+        aging = self._settings.queueing.aging
+        own = rank_of(task.terms, came_at=now, task_id=task.id, aging=aging)
+        waiter = self._waiters[task.id] = _Waiter(now, own, own)
         self._of_owner[task.submitter.owner] += 1
         self.times.note(task)
         if task.terms.after:
             self._depend(task)
             self._lift(task.id)
+        return waiter
 
     # changes of state
 
@@ -183,15 +189,14 @@ class PendingTasks:
         if task.state is not wanted:
             task = self._registry.change(task.id, wanted, now=now)
         if wanted is S.QUEUED:
-            self._queues[task.vehicle].put(self._entry(task))
+            self._put(task)
             self.woken.add(task.vehicle)
         else:
             self._queues[task.vehicle].discard(task.id)
         return task
 
-    def _entry(self, task: Task) -> Entry:
-        rank = self._waiters[task.id].rank
-        return Entry(task.id, rank, task.terms.priority, task.terms.is_preemptive)
+    def _put(self, task: Task) -> None:
+        self._queues[task.vehicle].put(task.id, self._waiters[task.id].rank, task.terms)
 
     def _wanted(self, task: Task, *, now: float) -> TaskState:
         return self._state_by(task.terms, is_met=self._waiters[task.id].is_met, now=now)
@@ -252,7 +257,7 @@ class PendingTasks:
         self.woken |= {task.vehicle, vehicle}
         task = self._registry.assign(task.id, vehicle, choice=choice, now=now)
         if is_ready:
-            self._queues[task.vehicle].put(self._entry(task))
+            self._put(task)
 
     # series
 
@@ -497,16 +502,10 @@ class PendingTasks:
 
     # order
 
-    def _own_rank(self, task: Task, came_at: float) -> Rank:
-        """Return a task's own rank, if it has competed with others since ``came_at``."""
-        place, aging = task.terms.place, self._settings.queueing.aging
-        if place is None:
-            return rank_of(task.terms.priority, came_at=came_at, task_id=task.id, aging=aging)
-        return rank_of(place.priority, came_at=place.at, task_id=place.task_id, aging=aging)
-
     def _rerank(self, task: Task, *, came_at: float) -> None:
-        waiter = self._waiters[task.id]
-        waiter.came_at, waiter.own = came_at, self._own_rank(task, came_at)
+        waiter, aging = self._waiters[task.id], self._settings.queueing.aging
+        waiter.came_at = came_at
+        waiter.own = rank_of(task.terms, came_at=came_at, task_id=task.id, aging=aging)
         self._lift(task.id)
 
     def _most_urgent(self, task_id: TaskId, own: Rank) -> Rank:
@@ -524,5 +523,5 @@ class PendingTasks:
             waiter.rank = rank
             task = self._registry[seen]
             if seen in self._queues[task.vehicle]:
-                self._queues[task.vehicle].put(self._entry(task))
+                self._put(task)
             seen = TaskId(task.terms.after)

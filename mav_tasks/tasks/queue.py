@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from mav_tasks.config.settings import Queueing
 from mav_tasks.tasks.lifecycle import TaskState
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, QueuePlace, Task, TaskId
+from mav_tasks.tasks.task import MAX_PRIORITY, QueuePlace, Task, TaskId, Terms
 
 
 class Rank(NamedTuple):
@@ -25,8 +25,15 @@ class Rank(NamedTuple):
     priority: int
 
 
-def rank_of(priority: int, *, came_at: float, task_id: float, aging: float) -> Rank:
-    """Return a task's own rank; ``came_at`` in monotonic seconds, ``aging`` 0 for none."""
+def rank_of(terms: Terms, *, came_at: float, task_id: float, aging: float) -> Rank:
+    """Return a task's own rank; ``aging`` 0 for none.
+
+    ``came_at``: since when it has competed with others, in monotonic seconds; this and its id do
+    not count for a task that was moved.
+    """
+    priority = terms.priority
+    if terms.place is not None:
+        priority, came_at, task_id = terms.place.priority, terms.place.at, terms.place.task_id
     if priority == MAX_PRIORITY:
         return Rank(False, 0.0, came_at, task_id, priority)
     urgency = came_at - priority * aging if aging > 0 else -float(priority)
@@ -47,15 +54,6 @@ def outranks(waiting: Task, running: Task, *, queueing: Queueing) -> bool:
     return gap > 0 and waiting.priority - running.priority >= gap
 
 
-class Entry(NamedTuple):
-    """A task in the queue; ``rank`` may be inherited from a dependent."""
-
-    task_id: TaskId
-    rank: Rank
-    priority: int = DEFAULT_PRIORITY
-    is_preemptive: bool = False
-
-
 #: sort key in the order of all tasks
 _InOrder = tuple[Rank, TaskId]
 #: sort key among the tasks that may interrupt
@@ -72,7 +70,8 @@ class TaskQueue:
         self._order: list[_InOrder] = []
         self._by_priority: list[_ByPriority] = []
         self._preemptive: list[_ByPriority] = []
-        self._entries: dict[TaskId, Entry] = {}
+        #: of each task: its rank, perhaps inherited from a dependent, and its terms
+        self._entries: dict[TaskId, tuple[Rank, Terms]] = {}
 
     def __repr__(self) -> str:
         return f"TaskQueue({len(self)}, next={self.first()})"
@@ -83,34 +82,35 @@ class TaskQueue:
     def __contains__(self, task_id: TaskId) -> bool:
         return task_id in self._entries
 
-    def _places(self, entry: Entry) -> list[tuple[list[Any], tuple[Any, ...]]]:
+    def _places(
+        self, task_id: TaskId, rank: Rank, terms: Terms
+    ) -> list[tuple[list[Any], tuple[Any, ...]]]:
         """Return the lists that a task belongs to, each with its item there."""
-        task_id, rank, priority, is_preemptive = entry
-        by_priority = (-priority, rank, task_id)
+        by_priority = (-terms.priority, rank, task_id)
         places: list[tuple[list[Any], tuple[Any, ...]]] = [
             (self._order, (rank, task_id)),
             (self._by_priority, by_priority),
         ]
-        if is_preemptive:
+        if terms.is_preemptive:
             places.append((self._preemptive, by_priority))
         return places
 
-    def put(self, entry: Entry) -> None:
+    def put(self, task_id: TaskId, rank: Rank, terms: Terms) -> None:
         """Insert a task, or move it to its new place."""
-        if entry.task_id in self._entries:
-            self.discard(entry.task_id)
-        self._entries[entry.task_id] = entry
-        for ordered, item in self._places(entry):
+        if task_id in self._entries:
+            self.discard(task_id)
+        self._entries[task_id] = rank, terms
+        for ordered, item in self._places(task_id, rank, terms):
             if ordered and item < ordered[-1]:
                 insort(ordered, item)
             else:  # nearly always
                 ordered.append(item)
 
-    def put_all(self, entries: Iterable[Entry]) -> None:
+    def put_all(self, entries: Iterable[tuple[TaskId, Rank, Terms]]) -> None:
         """Insert many tasks; none of them may be in the queue yet."""
-        for entry in entries:
-            self._entries[entry.task_id] = entry
-            for ordered, item in self._places(entry):
+        for task_id, rank, terms in entries:
+            self._entries[task_id] = rank, terms
+            for ordered, item in self._places(task_id, rank, terms):
                 ordered.append(item)
         for each in (self._order, self._by_priority, self._preemptive):
             each.sort()
@@ -118,7 +118,7 @@ class TaskQueue:
     def discard(self, task_id: TaskId) -> None:
         """Remove a task if it is in the queue."""
         if entry := self._entries.pop(task_id, None):
-            for ordered, item in self._places(entry):
+            for ordered, item in self._places(task_id, *entry):
                 del ordered[bisect_left(ordered, item)]
 
     def first(self) -> TaskId | None:
@@ -135,12 +135,12 @@ class TaskQueue:
 
     def rank(self, task_id: TaskId) -> Rank:
         """Return the rank with which a task waits in the queue."""
-        return self._entries[task_id].rank
+        return self._entries[task_id][0]
 
     def position(self, task_id: TaskId) -> int | None:
         """Return how many queued tasks run before this one, or None if it is not queued."""
         entry = self._entries.get(task_id)
-        return None if entry is None else bisect_left(self._order, (entry.rank, task_id))
+        return None if entry is None else bisect_left(self._order, (entry[0], task_id))
 
     def place_before(self, task_id: int) -> QueuePlace | None:
         """Return a place just before a task, 0: behind all; None: that task is not here."""

@@ -113,10 +113,8 @@ class GcsClient:
         self._statuses = TokenBucket(rate=settings.status_rate, burst=STATUSES_AT_ONCE)
         self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST)
         self._memory = Memory()
-        self._senders: dict[Address, Sender] = {}
-        self._observers: Sender | None = None
-        #: of the packet in hand
-        self.sender = Sender(self._memory)
+        self._senders: dict[Address | None, Sender] = {}
+        self._observers = Sender(Memory(OBSERVED))
         self.take_rights(NOTHING)
         self.apply(settings)
 
@@ -148,9 +146,11 @@ class GcsClient:
         return Submitter(self.outlet.link, self.endpoint, *source, *who)
 
     def take_rights(self, rights: Rights) -> None:
-        """Set what the submitter may do, and the limits of its key or role."""
+        """Set what the submitter may do, the limits of its key or role, and its ``Sender``."""
         self.rights, rate = rights, rights.limits.rate
         self.is_observer = not rights.reach(SUBMITTER)
+        #: of the packet in hand
+        self.sender = self._sender()
         place = rights.role, rights.key, rate
         limits = self._limits_of.get(place)
         if limits is None:
@@ -170,18 +170,17 @@ class GcsClient:
         submitter = task.submitter
         return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
 
-    def sender_at(self, source: Address) -> Sender:
-        """Return the ``Sender`` of an address; one for all observers.
+    def _sender(self) -> Sender:
+        """Return the ``Sender`` at the present address; one for all observers.
 
         Nothing of theirs lets a rover go, so that neither their numbers nor their words matter.
         """
         if self.is_observer:
-            self._observers = self._observers or Sender(Memory(OBSERVED))
             return self._observers
-        sender = self._senders.get(source)
+        sender = self._senders.get(self.source)
         if sender is None:
             sender = Sender(self._memory)
-            keep_latest(self._senders, source, sender, most=MAX_SENDERS)
+            keep_latest(self._senders, self.source, sender, most=MAX_SENDERS)
         return sender
 
     def heard(self, packet: Packet, *, now: float) -> None:

@@ -231,7 +231,6 @@ class GcsSide:
         client.arrived, client.waited = received.arrived, now - received.arrived
         if source != client.source or key is not client.signed_by:
             self._know(client, source, key)
-        client.sender = client.sender_at(source)
 
     def _know(self, client: GcsClient, source: Address, key: Key) -> None:
         client.source, client.signed_by = source, key

@@ -54,19 +54,14 @@ class AnyRequest(CommandRequest):
     def __init__(self, received: Received, said: Said, ours: Address) -> None:
         super().__init__(received.client, None, received.packet, said, received.row)
         component = said.command.target.component_id or ours.component_id
-        self._ours = Address(ours.system_id, component)
+        self.answering = Address(ours.system_id, component)
         #: the system id of the rover once it is known
         self.chosen = ANY
 
     @property
-    def answering(self) -> Address:
-        """The address that was addressed."""
-        return self._ours
-
-    @property
     def refusing(self) -> Address:
-        """The same: a refusal is no rover's."""
-        return self._ours
+        """The address that was addressed: a refusal is no rover's."""
+        return self.answering
 
     @property
     def rover(self) -> int:
@@ -80,7 +75,9 @@ class AnyRequest(CommandRequest):
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Send the COMMAND_ACK; an accepting one names the rover in result_param1."""
         rover = self.chosen if result is MavResult.ACCEPTED else ANY
-        self.said.answer = Answer(self.command.command, result, result_param2, self._ours, rover)
+        self.said.answer = Answer(
+            self.command.command, result, result_param2, self.answering, rover
+        )
         self.client.answer(self.said.answer, self.packet.source)
 
 

@@ -73,6 +73,8 @@ class CommandRequest:
     """One command of one client to one vehicle, to be answered exactly once."""
 
     vehicle: Vehicle
+    #: the component that answers: the target, or the task server for target 0
+    answering: Address
 
     def __init__(
         self, client: GcsClient, vehicle: Vehicle | None, packet: Packet, said: Said, row: Row
@@ -95,6 +97,9 @@ class CommandRequest:
         self.kind = row.kind
         if vehicle is not None:
             self.vehicle = vehicle
+            component, ours = command.target.component_id, vehicle.server_address
+            is_ours = component in (0, ours.component_id)
+            self.answering = ours if is_ours else Address(ours.system_id, component)
             if command.command == SET_MODE:
                 self.kind = kind_of(command, row, vehicle)
 
@@ -109,14 +114,6 @@ class CommandRequest:
     def earlier(self, *, within: float, now: float) -> Iterator[Said]:
         """Yield the sender's equal commands of the last so many seconds, the latest first."""
         return self.sender.earlier(self.said, within=within, now=now)
-
-    @property
-    def answering(self) -> Address:
-        """The component that answers: the target, or the task server for target 0."""
-        target, ours = self.command.target, self.vehicle.server_address
-        if target.component_id in (0, ours.component_id):
-            return ours
-        return Address(ours.system_id, target.component_id)
 
     @property
     def refusing(self) -> Address:

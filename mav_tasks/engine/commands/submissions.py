@@ -104,7 +104,9 @@ class Submissions:
         is_click = not is_ours and asked.is_go_to
         runs_now = is_click and (settings.guided == "now" or self._is_next_word(asked, now=now))
         why_not = why_older(asked, now=now) if runs_now else ""
-        if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
+        known, origin = self.deduplicator.known, vehicle.where.origin
+        if before := known(draft, confirmation=command.confirmation, origin=origin, now=now):
+            self.answer_repeat(asked, before, now=now)
             return
         if after := draft.terms.after:
             again, refuse = partial(self.submit, asked), partial(self.refuse, asked)
@@ -184,11 +186,15 @@ class Submissions:
 
     def run_now(self, asked: CommandRequest, draft: Draft, *, now: float) -> None:
         """Submit an immediate task. Raise Rejection if it is refused."""
-        asked.vehicle.joint.end_driving_of(asked.client.key, now=now)
-        if not self._is_repeat(asked, draft, confirmation=0, now=now):
-            task = self.take_in(asked.rights, asked.vehicle, draft, runs_now=True, now=now)
-            self.await_commit(asked, task, now=now)
-            give_back(asked, now=now)
+        vehicle = asked.vehicle
+        vehicle.joint.end_driving_of(asked.client.key, now=now)
+        origin = vehicle.where.origin
+        if before := self.deduplicator.known(draft, confirmation=0, origin=origin, now=now):
+            self.answer_repeat(asked, before, now=now)
+            return
+        task = self.take_in(asked.rights, vehicle, draft, runs_now=True, now=now)
+        self.await_commit(asked, task, now=now)
+        give_back(asked, now=now)
 
     def submit_draft(self, asked: CommandRequest, draft: Draft, *, now: float) -> Task:
         """Submit a task that a command implies. Raise Rejection if it is refused."""
@@ -313,17 +319,6 @@ class Submissions:
         refusal = Rejection(R.STORE_UNAVAILABLE, words)
         for each in askers:
             self._registry.record(each.refuse(refusal, now=now))
-
-    def _is_repeat(
-        self, asked: CommandRequest, draft: Draft, *, confirmation: int, now: float
-    ) -> bool:
-        """Whether a submission came before; if so, answer it."""
-        # only to compare places
-        origin = asked.vehicle.where.origin if isinstance(draft.goal, GoTo) else None
-        known = self.deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
-        if known is not None:
-            self.answer_repeat(asked, known, now=now)
-        return known is not None
 
     def answer_halt(self, client: GcsClient, said: Said, to: Address, *, now: float) -> None:
         """Send the answer to a command that has halted a vehicle once a restart would know that.

@@ -1,20 +1,24 @@
 """The order of waiting tasks."""
 
+from operator import itemgetter
+
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
-from mav_tasks.tasks.task import TaskId
+from mav_tasks.tasks.queue import Rank, TaskQueue, rank_of
+from mav_tasks.tasks.task import TaskId, Terms
 
 AGING = 60.0
+Entry = tuple[TaskId, Rank, Terms]
 
 
 def rank(priority: int, came_at: float, task_id: int = 1, *, aging: float = AGING) -> Rank:
-    return rank_of(priority, came_at=came_at, task_id=TaskId(task_id), aging=aging)
+    return rank_of(Terms(priority), came_at=came_at, task_id=TaskId(task_id), aging=aging)
 
 
 def entry(each: Rank, *, priority: int = 5, is_preemptive: bool = False) -> Entry:
-    return Entry(TaskId(int(each.task_id)), each, priority, is_preemptive)
+    terms = Terms(priority, is_preemptive=is_preemptive)
+    return TaskId(int(each.task_id)), each, terms
 
 
 def test_more_urgent_first_a_minute_counts_as_one_priority_and_equals_come_in_order() -> None:
@@ -48,11 +52,11 @@ def test_whatever_comes_and_goes_it_is_sorted_and_knows_who_may_interrupt(
             known[task_id] = entry(
                 rank(priority, at, task_id), priority=priority, is_preemptive=is_marked
             )
-            queue.put(known[task_id])
+            queue.put(*known[task_id])
     at_once = TaskQueue()
     at_once.put_all(list(known.values()))
-    entries = sorted(known.values(), key=lambda each: each.rank)
-    order = [each.task_id for each in entries]
+    entries = sorted(known.values(), key=itemgetter(1))
+    order = [task_id for task_id, _, _ in entries]
     for found in (queue, at_once):
         assert (found.in_order(), len(found)) == (order, len(order))
         assert found.first() == (order[0] if order else None)
@@ -61,9 +65,9 @@ def test_whatever_comes_and_goes_it_is_sorted_and_knows_who_may_interrupt(
         ]
         assert found.page(1, 2) == order[1:3]
         assert [n for n in range(1, 10) if TaskId(n) in found] == sorted(known)
-        marked = [each for each in entries if each.is_preemptive]
+        marked = [each for each in entries if each[2].is_preemptive]
         firsts = [  # by their own priority, of those that are marked and of all
-            min(several, key=lambda each: (-each.priority, each.rank)).task_id
+            min(several, key=lambda each: (-each[2].priority, each[1]))[0]
             for several in (marked, entries)
             if several
         ]
