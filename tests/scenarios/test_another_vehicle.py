@@ -13,7 +13,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode, Persona
 from tests.kit.cases import for_each
-from tests.kit.client import ARM, MOVE, SET_MODE
+from tests.kit.client import ARM, FAILED, MOVE, SET_MODE
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.rows import ask
 from tests.kit.volume import some
@@ -285,3 +285,19 @@ def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     assert world.paused() is R.RESTARTED
     assert any("is another vehicle now" in text for text in notes_of(world))
+
+
+def test_of_two_with_one_id_none_is_driven_and_commands_say_why(world: World) -> None:
+    world.run(2)
+    for _ in range(6):
+        forge(world, ROVER, PX4)
+        world.run(0.99)
+    refused = world.client.move(1.0)
+    world.run(1)
+    assert refused.answer == (FAILED, R.VEHICLE_SILENT)
+    assert world.client.said("only STOP works: rover 1 shares its id with another vehicle")
+    world.run(20)
+    world.client.proceed()
+    world.client.move(2.0)
+    world.until_idle(tasks=1)
+    assert world.states() == [S.COMPLETED]

@@ -139,7 +139,8 @@ class MessageRequests:
         to = _Reader(client, packet.source, tasks, address, now)
         client.uses_dialect = True
         if message_id == m.TaskTiming.id:  # needs the rover's setpoint rate
-            raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
+            words = self._vehicles.why_unheard(tasks.vehicle, now=now)
+            raise Rejection(R.VEHICLE_SILENT, words)
         if message_id == m.TaskStatus.id and task_id:
             self._send(to, [self._task(task_id)])
             return True

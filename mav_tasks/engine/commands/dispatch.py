@@ -122,7 +122,7 @@ class Commands:
             is_task_command(command.command) or command.command == MavCmd.DO_PAUSE_CONTINUE
         ):
             result, reason = result_of(R.VEHICLE_SILENT), int(R.VEHICLE_SILENT)
-            words = f"no heartbeat from rover {system_id} yet: only STOP works"
+            words = f"only STOP works: {self._vehicles.why_unheard(system_id, now=now)}"
         else:
             return
         source = Address(system_id, component) if tasks is not None and component else address

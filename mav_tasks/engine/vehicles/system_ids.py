@@ -121,6 +121,10 @@ class Strangers:
         self._which[number] = which, since
         return beat.at >= since
 
+    def share(self, system_id: int, *, now: float) -> bool:
+        """Return whether two send with an id, so that none of them is served."""
+        return system_id in self._which and now < self._which[system_id][1]
+
     def take_beat(self, system_id: int, *, now: float) -> Beat | None:
         """Return the last heartbeat if it came just now, and forget it."""
         beat = self.beats.pop(system_id, None)

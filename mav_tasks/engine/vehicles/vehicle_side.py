@@ -159,6 +159,12 @@ class VehicleSide(VehicleLinks):
         """The tasks of each vehicle of an earlier run that was not heard in this one."""
         return [tasks for tasks in self._fleet if tasks.vehicle not in self._vehicles]
 
+    def why_unheard(self, system_id: int, *, now: float) -> str:
+        """Return why a vehicle that has tasks is not served."""
+        if self._strangers.share(system_id, now=now):
+            return f"rover {system_id} {SHARED}"
+        return f"no heartbeat from rover {system_id} yet"
+
     def has_listened(self, *, now: float) -> bool:
         """Return whether this run is old enough to have heard every vehicle that is there."""
         return now - self._fleet.began_at > self._settings.watch.heartbeat_lost
