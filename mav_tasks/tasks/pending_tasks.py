@@ -96,15 +96,12 @@ class PendingTasks:
         queue = self._queues[vehicle]
         if len(queue) == self.count(vehicle):
             return queue.in_order()
-
-        def due_or_rank(task_id: TaskId) -> tuple[float, Rank]:
-            return self.times.start(self._registry[task_id].terms), self._waiters[task_id].rank
-
-        others = [each for each in self._of_vehicle(vehicle) if each not in queue]
-        return queue.in_order() + sorted(others, key=due_or_rank)
-
-    def _of_vehicle(self, vehicle: int) -> list[TaskId]:
-        return [each for each in self._waiters if self._registry[each].vehicle == vehicle]
+        others = [
+            (self.times.start(self._registry[each].terms), waiter.rank, each)
+            for each, waiter in self._waiters.items()
+            if self._registry[each].vehicle == vehicle and each not in queue
+        ]
+        return queue.in_order() + [task_id for _, _, task_id in sorted(others)]
 
     def rank(self, task: Task) -> Rank:
         """Return a task's rank among the ready ones; for an active task, the rank it would have."""
@@ -204,8 +201,12 @@ class PendingTasks:
     def _state_by(self, terms: Terms, *, is_met: bool, now: float) -> TaskState:
         if self.times.start(terms) > now:
             return S.SCHEDULED
-        if terms.is_staged or (terms.after and not is_met and self._is_waited_for(terms.after)):
+        if terms.is_staged:
             return S.BLOCKED
+        if terms.after and not is_met:
+            state = self._stands(terms.after)
+            is_waited_for = self.is_shared if state is None else state not in TERMINAL
+            return S.BLOCKED if is_waited_for else S.QUEUED
         return S.QUEUED
 
     def handle_deadline(self, *, now: float) -> None:
@@ -341,7 +342,7 @@ class PendingTasks:
 
     def forget(self, vehicle: int, *, now: float) -> set[TaskId]:
         """Forget all tasks of a vehicle, without ending them; return their ids."""
-        for task_id in self._of_vehicle(vehicle):
+        for task_id in [e for e in self._waiters if self._registry[e].vehicle == vehicle]:
             self.leave(self._registry[task_id])
         self._queues.pop(vehicle, None)
         self.woken.discard(vehicle)
@@ -392,11 +393,6 @@ class PendingTasks:
         """Return whether a task is known to have ended without being completed."""
         state = self._stands(after)
         return state is not S.COMPLETED and state in TERMINAL
-
-    def _is_waited_for(self, after: int) -> bool:
-        """Return whether a task is not over, as far as is known."""
-        state = self._stands(after)
-        return self.is_shared if state is None else state not in TERMINAL
 
     def is_in_question(self, after: int) -> bool:
         """Return whether only the fleet's store can say whether a task exists."""

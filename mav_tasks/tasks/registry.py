@@ -296,10 +296,12 @@ class TaskRegistry:
         self.modify(task_id, replace(self._tasks[task_id].terms, repeat=""), actor=actor, now=now)
         self.unplanned.pop(task_id, None)
 
-    def between_runs(self, series: int) -> TaskId | None:
-        """Return the last run of a series that is over and which another one is to follow."""
-        runs = (self._tasks[each] for each in self.unplanned if each in self._tasks)
-        return next((task.id for task in runs if task.terms.series == series), None)
+    def run_of(self, series: int) -> TaskId | None:
+        """Return the run of a series that is not over, or the last one if another is to follow."""
+        if run := self.runs.get(series):
+            return run
+        over = (self._tasks[each] for each in self.unplanned if each in self._tasks)
+        return next((task.id for task in over if task.terms.series == series), None)
 
     def runs_of(self, vehicle: int) -> list[Task]:
         """Return a run of each of a vehicle's series: it is not over, or another is to follow."""

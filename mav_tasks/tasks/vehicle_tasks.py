@@ -221,8 +221,8 @@ class VehicleTasks(Lineup):
         self.executor.pause(reason, actor=actor, now=now)
         self.pause_queue(reason, actor=actor, now=now)
         if reason in TAKEN:
-            last = self._jumps.last
-            self.displaced.taken_over(None if last is None else last.pose)
+            if self.displaced.taken_over_at is None and self._jumps.last is not None:
+                self.displaced.taken_over_at = self._jumps.last.pose
             self._end_cancelling(actor=actor, now=now)
         return self.executor.task_id
 

@@ -6,7 +6,7 @@ answer to a command comes back through ``deliver``.
 """
 
 from collections.abc import Hashable, Iterable
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, NamedTuple
 
 from mav_tasks.basics.errors import Rejection
@@ -24,6 +24,8 @@ from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.services import file_transfer
 from mav_tasks.engine.services.commands import Answer, Answered, Standing
 from mav_tasks.engine.services.orders import Phase, moves
+from mav_tasks.engine.vehicles.control import Event
+from mav_tasks.engine.vehicles.joint_control import Word
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -112,8 +114,11 @@ def passed(
     elif isinstance(message, m.ManualControl):
         if _has_moved(message, client, vehicle.persona.centred_throttles):
             vehicle.joint.sticks_moved(actor=str(client.who), now=now)
-    elif isinstance(message, m.RcChannelsOverride) and _is_off_centre(message):
-        vehicle.joint.sticks_moved(actor=str(client.who), now=now)
+    elif isinstance(message, m.RcChannelsOverride):
+        channels = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
+        off_centre = (abs(c - RC_CENTRE) for c in channels if c not in RC_IGNORED)
+        if any(each > STICKS_CENTRED for each in off_centre):
+            vehicle.joint.sticks_moved(actor=str(client.who), now=now)
 
 
 def _asks_to_stand(message: m.Message | None) -> bool:
@@ -145,11 +150,6 @@ def _has_moved(message: m.ManualControl, client: GcsClient, throttles: Iterable[
         client.throttle_centre = centre
         sticks.append(message.z - centre)
     return has_jumped or any(abs(s) > STICKS_CENTRED for s in sticks if s != NO_STICK)
-
-
-def _is_off_centre(message: m.RcChannelsOverride) -> bool:
-    channels = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
-    return any(abs(c - RC_CENTRE) > STICKS_CENTRED for c in channels if c not in RC_IGNORED)
 
 
 R = TaskReason
@@ -217,9 +217,9 @@ def deliver(
     assert isinstance(asker, _Asker), "only relay gives commands an origin"
     is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
     if is_accepted and _disarms(answered.request):
-        vehicle.parts.armings.was_answered()
+        vehicle.parts.armings.was_disarmed = True  # the answer may belong to an older disarming
     if answered.command == MavCmd.COMPONENT_ARM_DISARM and answered.ack and not is_accepted:
-        vehicle.parts.armings.client_was_refused()
+        vehicle.parts.armings.client_at = -inf  # if it shows armed now, somebody else did it
     client = gcs.client(asker.client)
     if client is None:
         return
@@ -295,7 +295,7 @@ class Forwarder:
                 vehicles[0].requests.forward(packet)
                 continue
             for vehicle in vehicles if row.needs_grant else ():
-                vehicle.parts.authority.note_withheld(client.key, now=now)
+                vehicle.parts.authority.withheld = client.key, now
             for vehicle in refusing if message is not None else ():
                 words = why_not_sent(row, vehicle, client.key)
                 if row.needs_grant and words == UNARMED:
@@ -334,9 +334,9 @@ class Forwarder:
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """Stop the vehicles that a client was driving, because it is gone."""
         for vehicle in self._vehicles.all:
-            if vehicle.parts.authority.has_granted((link, peer)):
+            if vehicle.parts.authority.forget((link, peer)):
                 self._vehicles.mark_dirty(vehicle)
-                vehicle.joint.client_is_gone((link, peer), now=now)
+                vehicle.joint.on(Event.GONE, Word(), now=now)
 
 
 def _target(message: m.Message) -> Address:

@@ -107,7 +107,7 @@ class TaskControl:
         """Return the present run of a series, or the last one, by the id of any of its runs."""
         named = self._registry.get(task_id)
         series = named.terms.series if named is not None else task_id
-        run = self._registry.runs.get(series) or self._registry.between_runs(series)
+        run = self._registry.run_of(series)
         if run is None and named is not None:
             raise Rejection(R.WRONG_STATE, f"task {task_id} does not repeat")
         return task_id if run is None else run

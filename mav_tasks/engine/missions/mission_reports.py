@@ -84,8 +84,9 @@ class MissionReports:
                 case PlanStored():
                     changed.add(event.vehicle)
                 case TaskChanged() | TaskAdvanced():
-                    if isinstance(event, TaskChanged) and event.new in OVER:
-                        self._drop_acts(event)
+                    is_over = isinstance(event, TaskChanged) and event.new in OVER
+                    if is_over and (vehicle := self._parts.vehicles.get(event.vehicle)):
+                        vehicle.requests.drop_acts(event.task_id)
                     task = self._parts.registry.get(event.task_id)
                     if task is not None and isinstance(task.goal, Plan):
                         changed.add(event.vehicle)
@@ -126,10 +127,6 @@ class MissionReports:
             act = task.goal.steps[event.step]
             assert isinstance(act, Act), "only an act is told"
             vehicle.act((event.task_id, event.step), act, now=now)
-
-    def _drop_acts(self, event: TaskChanged) -> None:
-        if vehicle := self._parts.vehicles.get(event.vehicle):
-            vehicle.requests.drop_acts(event.task_id)
 
     def tell_acted(self, vehicle: Vehicle, *, now: float) -> None:
         """Let a task that acts know the answer, and record in words one that is no yes."""

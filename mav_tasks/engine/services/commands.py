@@ -373,7 +373,8 @@ class CommandSender:
                 self._answer(waiting, None)
             lane.waiting.clear()
             flying = lane.in_flight
-            if flying is not None and _is_same_wish(flying, request):
+            are_clients = flying is not None and None not in (flying.packet, request.packet)
+            if flying and flying.is_urgent and are_clients and _asks_the_same(flying, request):
                 request.joined = [*flying.joined, flying]  # any answer is one for all of them
                 flying.joined = []
             elif flying is not None:
@@ -427,11 +428,6 @@ class CommandSender:
         was_sent = request.retry.sent > 0
         for each in (*request.joined, request):
             self._answers.append(Answered(each.origin, *each.lane, ack, each.message, was_sent))
-
-
-def _is_same_wish(one: _Request, other: _Request) -> bool:
-    """Whether two commands of clients ask for the same urgent thing."""
-    return one.is_urgent and None not in (one.packet, other.packet) and _asks_the_same(one, other)
 
 
 def _asks_the_same(one: _Request, other: _Request) -> bool:

@@ -82,7 +82,7 @@ class OffboardControl:
         self._watch = watch
         self._news = News(persona)
         self._looks_since = -inf  # s, since when a heartbeat is awaited that shows whose it is
-        self._wants_heartbeat = False
+        self.wants_heartbeat = False
         self._looks_back = False  # while LOOKING: it was being handed back, or stopped
         #: what decides which set-point asks it to stand
         self.posture = Posture()
@@ -146,10 +146,6 @@ class OffboardControl:
         return self.phase in STREAMING
 
     @property
-    def _may_arm_here(self) -> bool:
-        return self._news.in_hold if self._persona.arms_in_hold else self._news.in_our_mode
-
-    @property
     def _may_move(self) -> bool:
         return self._news.armed or self._news.in_our_mode
 
@@ -185,11 +181,6 @@ class OffboardControl:
         """Whether a disarming just seen can be our own doing."""
         self._note_requests(now)
         return self._news.may_be_our_disarming(is_stopping=self.phase is Phase.STOPPING, now=now)
-
-    def takes_heartbeat(self) -> bool:
-        """Whether the vehicle is to be asked for a heartbeat, once."""
-        wants, self._wants_heartbeat = self._wants_heartbeat, False
-        return wants
 
     def take_messages(self) -> list[Message]:
         """Return the setpoints to send since the last call."""
@@ -278,6 +269,8 @@ class OffboardControl:
             self.phase = Phase.IDLE
         if self.phase in ENDED and not self._shows_whose_it_is(now):
             self._look(now=now)
+        news, arms_in_hold = self._news, self._persona.arms_in_hold
+        is_in_place = news.in_hold if arms_in_hold else news.in_our_mode
         match self.phase:
             case Phase.LOOKING if not self._shows_whose_it_is(now):
                 if self._looks_back and self._news.mode == self._persona.control_mode:
@@ -295,7 +288,7 @@ class OffboardControl:
                     self._insist(Refused.MODE, now=now)
             case Phase.ASKING_MODE if not self._news.in_our_mode:
                 self._insist(Refused.MODE, now=now)
-            case Phase.ASKING_ARM if self._may_arm_here and not self._news.armed:
+            case Phase.ASKING_ARM if is_in_place and not news.armed:
                 self._send_setpoint(STANDING)
                 self._insist(Refused.ARM, now=now)
             case Phase.LEADING_IN if self._is_armed_in_hold and self._is_leading_in(now):
@@ -319,7 +312,7 @@ class OffboardControl:
         self._ask_to_show(now=now)
 
     def _ask_to_show(self, *, now: float) -> None:
-        self._looks_since, self._wants_heartbeat = now, True
+        self._looks_since, self.wants_heartbeat = now, True
 
     def _shows_whose_it_is(self, now: float) -> bool:
         return self._news.is_newer_than(self._looks_since if self.phase is Phase.LOOKING else now)
@@ -506,7 +499,9 @@ class OffboardControl:
         self._note_requests(now)
         if self.phase is not Phase.STOPPING:
             return
-        if heard and still and (self._news.in_hold or self._is_disarmed_by_stop):
+        is_news = self._news.is_settled or self._news.awaits_answer
+        is_disarmed = self._persona.stop_disarms and is_news and not self._news.armed
+        if heard and still and (self._news.in_hold or is_disarmed):
             self._withdraw_requests()
             self.phase = Phase.IDLE
             return
@@ -574,7 +569,8 @@ class OffboardControl:
         if self._insistence.is_refusal(now):
             self._give_up(what)
         elif self._insistence.is_due(now):
-            if self._insistence.begins_to_look():
+            if not self._insistence.has_looked:
+                self._insistence.has_looked = True
                 self._ask_to_show(now=now)
             if self._news.is_newer_than(self._looks_since):
                 if self._insistence.is_in_vain(now):
@@ -640,11 +636,6 @@ class OffboardControl:
             return False
         # a heartbeat each second may be a little late, and show that all is well
         return self._news.is_settled or now >= self._disarm_by + AWAITED - UNSTOPPED
-
-    @property
-    def _is_disarmed_by_stop(self) -> bool:
-        is_news = self._news.is_settled or self._news.awaits_answer
-        return self._persona.stop_disarms and is_news and not self._news.armed
 
     def _request(self, command: CommandLong | CommandInt, *, now: float) -> None:
         """Send what makes it stand or disarms it, ahead of what waits."""

@@ -24,7 +24,7 @@ class Insistence:
         self._again_at: float | None = None
         self._tries = 0
         self._is_refused = False
-        self._has_looked = False
+        self.has_looked = False
 
     def __repr__(self) -> str:
         return f"Insistence({self._tries} tries, again at {self._again_at})"
@@ -40,7 +40,7 @@ class Insistence:
         """A request has left."""
         self._tries += 1
         self._again_at = now + UNANSWERED
-        self._is_refused = self._has_looked = False
+        self._is_refused = self.has_looked = False
 
     def accepted(self) -> None:
         """It was accepted: what it asks for shows, or somebody has undone it."""
@@ -63,11 +63,6 @@ class Insistence:
     def is_due(self, now: float) -> bool:
         """Whether it is time to look whether to ask again, as long as nobody has acted."""
         return self._again_at is not None and now >= self._again_at
-
-    def begins_to_look(self) -> bool:
-        """Whether that heartbeat is to be asked for now: once a request."""
-        begins, self._has_looked = not self._has_looked, True
-        return begins
 
 
 @dataclass(slots=True)

@@ -27,10 +27,10 @@ class Armings:
     """The memory of who wanted one vehicle armed or disarmed."""
 
     def __init__(self) -> None:
-        self._client_at = -inf  # when a client last asked to arm it
+        self.client_at = -inf  #: when a client last asked to arm it, and was not refused
         self._outdated_at = -inf  # requests to arm from before this time do not count
         self._may_show_until = -inf  # s, that such a request shows as armed
-        self._was_disarmed = False  # at that time, or since
+        self.was_disarmed = False  #: at that time, or since
         #: a client asked for its disarming, and no heartbeat has shown that yet: until then the
         #: vehicle counts as disarmed
         self.is_to_be_disarmed = False
@@ -41,17 +41,13 @@ class Armings:
 
     def client_arms(self, *, now: float) -> None:
         """Note that a client's request to arm goes to the vehicle through us."""
-        self._client_at = now
+        self.client_at = now
         self.forget_halts()
-
-    def client_was_refused(self) -> None:
-        """Note that the vehicle has refused it: if it shows armed now, somebody else did it."""
-        self._client_at = -inf
 
     def are_by_client(self, *, now: float) -> bool:
         """Return whether a client, through us, has armed the vehicle, or has just asked for it."""
-        is_soon = now - self._client_at <= SHOWN_LATE
-        may_be = is_soon and self._client_at > self._outdated_at
+        is_soon = now - self.client_at <= SHOWN_LATE
+        may_be = is_soon and self.client_at > self._outdated_at
         return self._is_clients if self._is_armed else may_be
 
     def outdate(self, *, ours: float, armed: bool, now: float, only_ours: bool = False) -> None:
@@ -60,27 +56,23 @@ class Armings:
         ``ours`` is when we last asked for arming ourselves. ``only_ours``: only that one, if it is
         the latest, because we need it armed no more.
         """
-        asked_at = max(ours, self._client_at)
-        is_meant = not only_ours or self._client_at < ours
+        asked_at = max(ours, self.client_at)
+        is_meant = not only_ours or self.client_at < ours
         if is_meant and now - asked_at <= LATE:
-            self._outdated_at, self._was_disarmed = now, not armed
+            self._outdated_at, self.was_disarmed = now, not armed
             self._may_show_until = min(asked_at + RESENT, now) + SHOWN_LATE
 
     def outdate_earlier(self, *, armed: bool, until: float, now: float) -> None:
         """Outdate the requests of an earlier run; their effect may show ``until`` then."""
-        self._outdated_at, self._was_disarmed = now, not armed
+        self._outdated_at, self.was_disarmed = now, not armed
         self._may_show_until = until
 
     def shows(self, *, armed: bool, now: float) -> None:
         """Note the armed state in a heartbeat, and who armed it if it is the first to show it."""
         self._is_clients = self.are_by_client(now=now)
         self._is_armed = armed
-        self._was_disarmed |= not armed
+        self.was_disarmed |= not armed
         self.is_to_be_disarmed &= armed
-
-    def was_answered(self) -> None:
-        """Note an acknowledged disarming; the acknowledgement may belong to an older one."""
-        self._was_disarmed = True
 
     def are_older(self, *, ours: float, now: float) -> bool:
         """Return whether, if it shows armed, that is by an outdated request."""
@@ -95,7 +87,7 @@ class Armings:
         self._may_show_until, self.is_to_be_disarmed = -inf, False
 
     def _may_be_older(self, ours: float, now: float) -> bool:
-        return self._was_disarmed and ours <= self._outdated_at and now <= self._may_show_until
+        return self.was_disarmed and ours <= self._outdated_at and now <= self._may_show_until
 
 
 STREAM_GAP = 0.5  # s between the setpoints of a stream: OFFBOARD needs at least 2 Hz
@@ -131,15 +123,18 @@ class Authority:
         self.may_arm_again = may_arm
         self._permit = Permit[Driving](halts)
         self._asked_at = -inf
-        self._passed_on: dict[int, float] = {}  # when a client last asked for each mode
+        #: when a client last asked for each mode, or (ANY_MODE) for what may set one
+        self.passed_on: dict[int, float] = {}
         self._mode_is_ours = False
         self.other_at = -inf  #: s, when somebody drove it who is not our client
-        self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message's sender
+        #: the client whose motion message did not pass last, and when
+        self.withheld: tuple[Hashable, float] = (None, -inf)
         #: whether we may arm it; withdrawn when somebody disarms it or changes its mode
         self.may_arm = may_arm
         #: whether a vehicle restart, and nobody, has withdrawn the permission
         self.is_withdrawn_by_restart = False
-        self._before: Before | None = None  # at the last disarming; None: somebody has acted since
+        #: at the last disarming that was not ours; None: somebody has acted since
+        self.before: Before | None = None
 
     def __repr__(self) -> str:
         return f"Authority(may_arm={self.may_arm}, mode_is_ours={self._mode_is_ours})"
@@ -155,19 +150,7 @@ class Authority:
     def withdraw_arming(self) -> None:
         """Stop arming the vehicle, because somebody else controls it."""
         self.may_arm = self.is_withdrawn_by_restart = False
-        self._before = None
-
-    def note_disarmed(self, before: Before) -> None:
-        """Remember the state before a disarming that was not ours."""
-        self._before = before
-
-    def take_disarmed(self, *, since: float) -> Before | None:
-        """Return the state before the disarming, if that was seen after ``since``, else None.
-
-        A restart at that time explains the disarming, unless somebody has acted after it.
-        """
-        before, self._before = self._before, None
-        return before if before is not None and before.at >= since else None
+        self.before = None
 
     def restarted(self, *, was_allowed: bool) -> None:
         """Withdraw the permission to arm after a vehicle restart; any person may restore it."""
@@ -183,7 +166,7 @@ class Authority:
         """Allow arming again, as a person asked."""
         self.may_arm = self.may_arm_again
         self.is_withdrawn_by_restart = False
-        self._before = None
+        self.before = None
 
     def client_asks(self, mode: int, client: Hashable, *, present_mode: int, now: float) -> None:
         """Note a client's mode request to the vehicle; our own mode then counts as set by us.
@@ -191,7 +174,7 @@ class Authority:
         Only the last client that asked may drive: the vehicle would obey neither of two at once.
         """
         self._driving.mode, self._asked_at = mode, now
-        keep_latest(self._passed_on, mode, now, most=MOST_MODES)
+        keep_latest(self.passed_on, mode, now, most=MOST_MODES)
         if mode == self._persona.control_mode:
             self._driving.client = client
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
@@ -210,10 +193,6 @@ class Authority:
         self._mode_is_ours = (by_us or by_client) and not is_late
         return self._mode_is_ours
 
-    def note_passed_on(self, *, now: float) -> None:
-        """Note a client's command to the vehicle that may make it drive, in a mode of its own."""
-        self._passed_on[ANY_MODE] = now
-
     def was_asked_before(self, mode: int, *, ours: float = -inf, halt: float) -> bool:
         """Return whether a mode shown now was asked for shortly before a halt, and not since.
 
@@ -228,7 +207,7 @@ class Authority:
         return self._asked_for(mode, ours=ours) > -inf
 
     def _asked_for(self, mode: int, *, ours: float) -> float:
-        asked = max(self._passed_on.get(mode, -inf), self._passed_on.get(ANY_MODE, -inf))
+        asked = max(self.passed_on.get(mode, -inf), self.passed_on.get(ANY_MODE, -inf))
         return max(asked, ours) if mode == self._persona.control_mode else asked
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
@@ -254,13 +233,9 @@ class Authority:
         """Return whether this client has asked for our mode since the last task or halt."""
         return client is not None and client == self._driving.client
 
-    def note_withheld(self, client: Hashable, *, now: float) -> None:
-        """Note that a client's motion message did not pass."""
-        self._withheld = client, now
-
     def streams(self, client: Hashable, *, now: float) -> bool:
         """Return whether a client streams motion messages that do not pass."""
-        who, at = self._withheld
+        who, at = self.withheld
         return who == client and now - at <= STREAM_GAP
 
     def revoke(self) -> None:

@@ -28,7 +28,6 @@ from mav_tasks.engine.vehicles.control import (
 )
 from mav_tasks.engine.vehicles.parts import HoldBefore, Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
-from mav_tasks.mavlink.address import Address
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, RUNNING, TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId
@@ -323,11 +322,6 @@ class JointControl:
         event = Event.EMERGENCY_STOP if by_force else Event.DISARM
         self.on(event, Word(R.DISARMED, actor, do=do), now=now)
 
-    def second_controller(self, who: Address, *, now: float) -> None:
-        """Send HOLD once and let go: setpoints, or our own address, come from elsewhere."""
-        word = Word(R.OTHER_CONTROLLER, str(who), f"also controlled by {who}")
-        self.on(Event.SECOND, word, now=now)
-
     def sticks_moved(self, *, actor: str, now: float) -> None:
         """Let go: a client sends manual control input."""
         word = Word(R.TAKEOVER, actor, "manual control")
@@ -502,11 +496,6 @@ class JointControl:
         """
         if client is not None and client_driving(self._parts, now=now) == client:
             self.on(Event.DRIVING_ENDS, Word(), now=now)
-
-    def client_is_gone(self, client: Hashable, *, now: float) -> None:
-        """Stop what a disconnected client drove, without waiting for the vehicle's timeout."""
-        if self._parts.authority.forget(client):
-            self.on(Event.GONE, Word(), now=now)
 
     def stand_down(self, client: Hashable, *, now: float) -> None:
         """Disarm the vehicle, which a client has landed, once no task is left to drive.

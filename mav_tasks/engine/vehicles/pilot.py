@@ -123,7 +123,10 @@ class Pilot:
         """
         parts = self._parts
         self._face(now=now)
-        is_better = parts.persona.brakes_by_setpoints or self._may_be_a_car(now=now)
+        # met driving just now, it has not said yet how it turns
+        is_known = parts.requests.parameters.turning is not None
+        may_be_car = now - self._regained_at <= BRAKES_FOR and not is_known
+        is_better = parts.persona.brakes_by_setpoints or may_be_car
         is_seen = parts.where.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
         brakes = brakes and is_better and is_seen
         longest = parts.settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
@@ -163,11 +166,6 @@ class Pilot:
         self.guard.told_to_move(now=now)
         self.watch(now=now)
 
-    def _may_be_a_car(self, *, now: float) -> bool:
-        """Return whether it was met driving just now, and has not said yet how it turns."""
-        is_known = self._parts.requests.parameters.turning is not None
-        return now - self._regained_at <= BRAKES_FOR and not is_known
-
     def brakes_against_stick(self, *, now: float) -> bool:
         """Return whether set-points stop it before HOLD is asked for, although a stick is held.
 
@@ -204,7 +202,8 @@ class Pilot:
         match demand.kind:
             case DemandKind.TAKE:
                 control.take(may_arm=seen.may_arm, now=now)
-                if control.takes_heartbeat():
+                if control.wants_heartbeat:
+                    control.wants_heartbeat = False
                     parts.requests.ask_to_show(now=now)
             case DemandKind.DRIVE:
                 wanted = demand.velocity

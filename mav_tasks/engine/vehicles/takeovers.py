@@ -136,7 +136,9 @@ class Takeovers:
         parts.undecided.clear()  # it was the restart
         self._shows_restart = True
         parts.forget_answers()
-        before = parts.authority.take_disarmed(since=booted_at)
+        before, parts.authority.before = parts.authority.before, None
+        if before is not None and before.at < booted_at:
+            before = None
         could_arm = (before or parts.authority).may_arm
         was_paused = (before or parts.tasks).paused
         # heartbeats that show the disarming may be lost or under way
@@ -271,7 +273,7 @@ class Takeovers:
 
     def _disarmed_by_person(self, before: Before, now: float) -> None:
         self._taken(Event.DISARMED, "disarmed", now=now)
-        self._parts.authority.note_disarmed(before)  # it may turn out that a restart did it
+        self._parts.authority.before = before  # it may turn out that a restart did it
 
     def _note_rest(self, *, now: float) -> None:
         """Learn its noise at rest while nothing can be telling it to move."""

@@ -22,7 +22,7 @@ from mav_tasks.engine.services.vehicle_status import (
     kind_of,
     uid_of,
 )
-from mav_tasks.engine.vehicles.authority import Authority, Before
+from mav_tasks.engine.vehicles.authority import ANY_MODE, Authority, Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.joint_control import JointControl, Word
 from mav_tasks.engine.vehicles.parts import Parts
@@ -392,7 +392,7 @@ class Vehicle:
         elif command == MavCmd.COMPONENT_ARM_DISARM:
             self.joint.arm(now=now)
         elif command != MavCmd.DO_SET_MODE and row_of_command(command).passed_on.kind in MOVING:
-            self.parts.authority.note_passed_on(now=now)  # which may set any mode
+            self.parts.authority.passed_on[ANY_MODE] = now
         self.requests.relay(
             packet,
             message,

@@ -464,4 +464,6 @@ class VehicleSide(VehicleLinks):
                 self.note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
             elif not sent_to and target in (0, vehicle.system_id) and there[0] == place[0]:
                 self.mark_dirty(vehicle)
-                vehicle.joint.second_controller(packet.source, now=now)
+                words = f"also controlled by {packet.source}"
+                word = Word(TaskReason.OTHER_CONTROLLER, str(packet.source), words)
+                vehicle.joint.on(Event.SECOND, word, now=now)

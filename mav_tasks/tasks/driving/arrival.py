@@ -73,10 +73,6 @@ class Creeping:
             seen = max(0.0, min(LONGEST_LAG, way / speed))
             self.lag += (0.5 * min(1.0, speed / self._telling)) * (seen - self.lag)
 
-    def had_no_effect(self, speed: float) -> None:
-        """Raise the least speed, since the rover stands at this speed."""
-        self.least = max(self.least, min(MOST_CREEP, speed * RAISE))
-
     def overshot(self) -> None:
         """Lower the least speed, since the rover overshot the end."""
         self.least = max(self._least_known, self.least / RAISE)
@@ -186,7 +182,7 @@ class Arrival:
         self._crept = since, before, slowest
         if now - since >= ASKED:
             if abs(before - course.remaining) < EFFECT * slowest * (now - since):
-                creeping.had_no_effect(slowest)
+                creeping.least = max(creeping.least, min(MOST_CREEP, slowest * RAISE))
             self._crept = None
 
     def _driven(self, course: PathFollower) -> Creeping:

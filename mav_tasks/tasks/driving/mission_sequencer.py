@@ -97,8 +97,9 @@ def loops_in_vain(plan: Plan) -> int | None:
 
     It assumes that every jump may be taken, or not taken, at any time.
     """
-    steps = range(len(plan.steps))
-    ways = {step: ways_on(plan.steps, step) for step in steps if _takes_no_time(plan, step)}
+    goals = ((step, _driven(plan, step)) for step in range(len(plan.steps)))
+    instant = (step for step, goal in goals if goal is None or goal.is_instant)
+    ways = {step: ways_on(plan.steps, step) for step in instant}
     try:
         TopologicalSorter(ways).prepare()
     except CycleError as why:
@@ -139,11 +140,6 @@ def look_on_the_way(
     if done:
         progress = replace(progress, pending=progress.pending[len(done) :])
     return Looked(progress, tuple(done), performs)
-
-
-def _takes_no_time(plan: Plan, step: int) -> bool:
-    goal = _driven(plan, step)
-    return goal is None or goal.is_instant
 
 
 def ways_on(steps: Sequence[Step], step: int) -> list[int]:

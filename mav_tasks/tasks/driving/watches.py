@@ -257,17 +257,12 @@ class LedAway:
     """
 
     def __init__(self) -> None:
-        self._taken_over_at: Pose | None = None
+        self.taken_over_at: Pose | None = None  #: where the vehicle was taken over
         self._tasks: set[TaskId] = set()
-
-    def taken_over(self, at: Pose | None) -> None:
-        """Note where the vehicle was taken over."""
-        if self._taken_over_at is None:
-            self._taken_over_at = at
 
     def given_back(self, seen: VehicleView, aside: Iterable[TaskId]) -> None:
         """Note that the vehicle is ours again; ``aside`` are the tasks that are still suspended."""
-        at, self._taken_over_at = self._taken_over_at, None
+        at, self.taken_over_at = self.taken_over_at, None
         if at is not None and seen.motion is not None and distance(seen.motion.pose, at) > LED_AWAY:
             self._tasks.update(aside)
 
