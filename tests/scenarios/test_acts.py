@@ -22,6 +22,7 @@ from tests.kit.world import World, is_at
 from tests.scenarios.conftest import MakeWorld
 
 RELAY, COMMAND_ACK = 181, 77
+IN_PROGRESS = 5
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
 TOLD = "TASK_ACT 1 5; DO_SET_RELAY 0 1 0 0 frame=2"
 UNANSWERED = Faults(withheld=frozenset({COMMAND_ACK}))
@@ -186,3 +187,20 @@ def test_a_parameter_that_cannot_be_sent_is_named(value: float, at: int, kind: s
     params = tuple(value if index == at else 0.0 for index in range(1, 8))
     with pytest.raises(ValueError, match=rf"param{at} \S+ is not {kind} number"):
         assert Act(RELAY, params).sent
+
+
+def test_an_act_has_time_as_long_as_the_rover_says_that_it_goes_on(world: World) -> None:
+    task = told_without_an_answer(world)
+
+    def say(result: int) -> None:
+        ack = common.MAVLink_command_ack_message(RELAY, result)
+        world.from_vehicle_side(ack.pack(common.MAVLink(None, 1, 1)), peer="rover1")
+
+    for _ in range(4):
+        world.run(2.5)
+        say(IN_PROGRESS)
+    world.run(2.5)
+    assert world.state(task) == (S.EXECUTING, R.NONE)
+    say(ACCEPTED)
+    world.until_state(task, S.COMPLETED, within=1.0)
+    assert times_told(world) == 1

@@ -9,10 +9,12 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
+    FAILED,
     GUIDED,
     IDS,
     MOVE,
@@ -36,6 +38,7 @@ from tests.scenarios.conftest import MakeWorld
 ATTITUDE, POSITION = 30, 32
 OUR_MESSAGES = range(54000, 54050)
 CLEAR = 54011
+FORMAT, IN_PROGRESS = 526, 5
 
 
 def rate(client: FakeClient, message_id: int, since: float, until: float) -> float:
@@ -324,3 +327,33 @@ def test_keys_are_not_set_through_the_server(world: World) -> None:
     world.run(0.1)
     assert IDS["PING"] in towards
     assert IDS["SETUP_SIGNING"] not in towards
+
+
+def test_a_long_command_has_time_as_long_as_the_rover_says_it_goes_on(world: World) -> None:
+    world.fault(Faults(withheld=frozenset({IDS["COMMAND_ACK"]})))
+
+    def say(result: int, progress: int = 0) -> None:
+        mav = common.MAVLink(None, 1, 1)
+        ack = common.MAVLink_command_ack_message(FORMAT, result, progress, 0, 255, 190)
+        world.from_vehicle_side(ack.pack(mav), peer="rover1")
+
+    client = world.client
+    for last in (ACCEPTED, FAILED):
+        client.acks.clear()
+        client.command(FORMAT, 1, 1, target=(1, 1))
+        for progress in (10, 40, 90):
+            world.run(0.3 if progress == 10 else 2.5)
+            say(IN_PROGRESS, progress)
+        world.run(2.5)
+        say(last)
+        world.run(0.1)
+        assert [(a.result, a.progress) for a in client.acks] == [
+            *((IN_PROGRESS, progress) for progress in (10, 40, 90)),
+            (last, 0),
+        ]
+    client.command(FORMAT, 2, 1, target=(1, 1))
+    world.run(0.3)
+    say(IN_PROGRESS)
+    world.run(3.5)
+    assert client.acks_of(FORMAT)[-1] == (TEMPORARILY_REJECTED, R.VEHICLE_SILENT)
+    assert world.observer.sent_since(0).count(str(FORMAT)) == 3

@@ -215,15 +215,19 @@ def deliver(
     """Answer the client with the vehicle's answer, or with a refusal if there is none."""
     asker = answered.origin
     assert isinstance(asker, _Asker), "only relay gives commands an origin"
-    is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
+    client, ack, command = gcs.client(asker.client), answered.ack, answered.command
+    if ack is not None and ack.result == MavResult.IN_PROGRESS:
+        if client is not None:
+            told = Answer(command, ack.result, ack.result_param2, asker.answering, ack.progress)
+            client.answer(told, asker.source)
+        return
+    is_accepted = ack is not None and ack.result == MavResult.ACCEPTED
     if is_accepted and _disarms(answered.request):
         vehicle.parts.armings.was_disarmed = True  # the answer may belong to an older disarming
-    if answered.command == MavCmd.COMPONENT_ARM_DISARM and answered.ack and not is_accepted:
+    if command == MavCmd.COMPONENT_ARM_DISARM and ack and not is_accepted:
         vehicle.parts.armings.client_at = -inf  # if it shows armed now, somebody else did it
-    client = gcs.client(asker.client)
     if client is None:
         return
-    ack, command = answered.ack, answered.command
     if ack is not None:
         result, param2 = ack.result, ack.result_param2
         # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK; some autopilots

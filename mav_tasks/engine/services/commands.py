@@ -79,6 +79,8 @@ class Answer(NamedTuple):
 
 REPEAT = 0.25  # s, between our own repeats
 LATE = 0.4  # s, during which acks of a command given up are still expected
+WORKING = 3.0  # s from one IN_PROGRESS to the next or to the end, as MAVSDK has it
+IN_PROGRESS = MavResult.IN_PROGRESS
 KEPT_LANES = 16  # beyond these, idle ones are forgotten
 MAX_WAITING = 16  # commands of one id; beyond, the last in order is answered "busy" at once
 LEFT_TO_ANSWER = 0.5  # of the time that a question waits: sent later, it seemed unanswered
@@ -91,6 +93,8 @@ SHARED = frozenset({MavCmd.REQUEST_MESSAGE})
 @dataclass(frozen=True, slots=True)
 class Answered:
     """A command is over: ``ack`` is the vehicle's answer, None if it gave none in time.
+
+    A client's may also be IN_PROGRESS; then it is not over.
 
     ``was_sent`` is False if the command never left, because others were before it.
     """
@@ -291,16 +295,20 @@ class CommandSender:
 
     def receive(self, ack: CommandAck, *, component: int, now: float) -> None:
         """Take an ack of a component of the vehicle; one that nobody waits for is dropped."""
-        lane = self._lanes.get((component, ack.command))
-        if lane is None or ack.result == MavResult.IN_PROGRESS:
-            return  # IN_PROGRESS is no answer yet: the terminal one follows
+        lane, is_over = self._lanes.get((component, ack.command)), ack.result != IN_PROGRESS
+        if lane is None:
+            return
         if lane.in_flight is None:
-            self._take_late(lane, ack, now=now)
+            if is_over:
+                self._take_late(lane, ack, now=now)
             return
         packet = lane.in_flight.packet
         asker = self._source if packet is None else packet.source
         if not Address(ack.target_system, ack.target_component).reaches(asker):
             return  # others may command the vehicle by another way
+        if not is_over:
+            self._goes_on(lane.in_flight, ack, now=now)
+            return
         if lane.owed and now < lane.owed_until:  # the answer to what was pushed aside comes first
             lane.owed -= 1
             return
@@ -354,6 +362,20 @@ class CommandSender:
         outgoing, self._outgoing = self._outgoing, []
         answers, self._answers = self._answers, []
         return outgoing, answers
+
+    def _goes_on(self, request: _Request, ack: CommandAck, *, now: float) -> None:
+        """Give a command that is being carried out time to end; no copy of it is sent.
+
+        What is urgent is repeated nevertheless: it halts the vehicle.
+        """
+        if request.is_urgent:
+            return
+        retry = request.retry
+        retry.give_up_at = retry.next_at = max(retry.give_up_at, now + WORKING)
+        if request.origin is not None:
+            self._answers.append(
+                Answered(request.origin, *request.lane, ack, request.message, True)
+            )
 
     def _take_late(self, lane: _Lane, ack: CommandAck, *, now: float) -> None:
         """Let the lane go on after the last ack of a command of ours that was withdrawn."""
