@@ -52,7 +52,6 @@ ALLOWED = {
     ("tools/mutants.py", "compile"): "code of this repository, with a fault in it",
     ("sim/rover_sim/planar.py", "random"): "how a simulated body differs from others, by a seed",
     ("mav_tasks/links/memory.py", "random"): "the virtual net loses packets by a seed",
-    ("tools/bench/floods.py", "random"): "noise of a flood, the same in every run",
     ("sim/rover_sim/bullet.py", "random"): "sensor noise of a simulated rover, by a seed",
     ("sim/rover_sim/estimator.py", "random"): "sensor noise of a simulated rover, by a seed",
     ("sim/rover_sim/timing.py", "random"): "how late a simulated rover answers, by a seed",

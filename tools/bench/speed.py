@@ -1,52 +1,60 @@
-"""One server and one rover: commands, STOPs and packets a second, uploads, starts, calls."""
+"""One server and one rover: commands, packets and uploads beside their yardsticks, and starts."""
 
 import os
+import signal
 import subprocess
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import count, islice
-from pathlib import Path
+from math import nan
 from select import select
-from statistics import median
 from tempfile import TemporaryFile
-from time import monotonic, perf_counter, sleep
+from time import perf_counter, sleep
+from typing import Any
+
+from mavsdk import ComponentType, Configuration, Mavsdk, log_subscribe
+from mavsdk.plugins.mission_raw import MissionRaw
+from mavsdk.plugins.mission_raw.mission_raw import MissionItem
+from mavsdk.plugins.mission_raw_server import MissionRawServer
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from tests.kit.postgres import connected
+from tests.kit.processes import free_udp_ports
 
-from .processes import (
+from .harness import (
     BUILD,
     CLI,
     HOST,
-    Process,
-    bare,
-    database,
-    environment,
-    server,
-    simulated_rovers,
-)
-from .rows import Percentiles, Row, percentiles
-from .wire import (
     OUTSTANDING,
     STANDING,
+    Peer,
+    Process,
     Rovers,
-    Speaker,
+    Row,
+    Rows,
+    bare,
+    beside,
+    database,
     effect,
     introduced,
     move,
+    p50,
+    p99,
+    paced,
     rate,
+    server,
+    simulated_rovers,
+    timed,
 )
 
 WARM_UP, ONE_BY_ONE, MANY = 500, 3_000, 40_000  # commands
-Acks = tuple[Percentiles, float]  # seconds of one, and answers a second
-ACK = m.CommandAck.id
 PAGE = b"x" * 4_096  # bytes of an fsync
-INSERT = "INSERT INTO public.plain (body) VALUES (%s)"
-BODY = "x" * 300  # about the row of a submission
+INSERT = "INSERT INTO public.plain (body) VALUES (repeat('x', 300))"  # about a submission's row
 PACKETS = 60_000
 ROVERS = (1, 20, 100)
 RATE = 40  # packets/s of each rover
@@ -61,74 +69,83 @@ TELEMETRY = (LOCAL, ATTITUDE, RC, LOCAL, ATTITUDE, GLOBAL, LOCAL, ATTITUDE, RC, 
 STARTS = 5
 CALLS = ("submit wait 0.1", "status 1", "queue", "vehicles")
 LIBRARY = "from mav_tasks import Client, Move"
+SIZES = (50, 500)  # items of an upload
+UPLOADS, FIRST = 20, 3  # the first are not counted
+#: s before each upload. Within 0.6 s of the previous upload, the server waits for late items
+#: (engine/missions/transfer.py); the upload to the other end is in between
+BETWEEN = 0.35
+FIND_WITHIN = 10.0  # s
+LATITUDE, LONGITUDE = -353632621, 1491652374  # degE7, the simulated rover's start
+METRE = 90  # degE7 of latitude, about
+WAYPOINT: dict[str, Any] = {"frame": 6, "command": 16, "autocontinue": 1, "mission_type": 0}
+WAYPOINT |= {"param1": 0.0, "param2": 1.0, "param3": 0.0, "param4": nan, "z": 0.0}
 
 
-def commands(tree: Path) -> Iterator[Row]:
+#: p50 and p99 of the seconds until a command's answer; answers a second with many under way
+Acks = tuple[float, float, float]
+
+
+def commands() -> Rows:
     """COMMAND_LONG (TASK_MOVE) → COMMAND_ACK, store in memory; beside a bare echo."""
-    echo = _echo()
-    yield from _rows("", _served(tree), echo, "echo", "≤ 1.6×", "≥ 0.65×")
+    yield from _rows("", _served(), _echo(), "echo", "≤ 1.6×", "≥ 0.65×")
 
 
-def durable(tree: Path) -> Iterator[Row]:
+def durable() -> Rows:
     """The same with the store on a disk; beside an echo and an fsync."""
-    times, acks = _echo()
+    median, most, acks = _echo()
     with TemporaryFile(dir=BUILD, buffering=0) as file:
 
         def write() -> None:
             file.write(PAGE)
             os.fsync(file)
 
-        sync = percentiles([timed(write) for _ in range(500)])
-    both = Percentiles(times.p50 + sync.p50, times.p99 + sync.p99)
-    ours = _served(tree, "--store=tasks.sqlite3")
-    yield from _rows(", on the disk", ours, (both, acks), "echo + fsync", "≤ 1.5×", "≥ 0.5×")
+        syncs = [timed(write) for _ in range(500)]
+    both = median + p50(syncs), most + p99(syncs), acks
+    ours = _served("--store=tasks.sqlite3")
+    yield from _rows(", on the disk", ours, both, "echo + fsync", "≤ 1.5×", "≥ 0.5×")
 
 
-def postgres(tree: Path) -> Iterator[Row]:
+def postgres() -> Rows:
     """The same with PostgreSQL on this machine; beside one INSERT, by turns."""
     inserts: list[float] = []
     with database() as it, connected(it.new_database()) as plain:
         plain.execute("CREATE TABLE public.plain (id BIGSERIAL, body TEXT)")
 
         def insert() -> None:
-            inserts.append(timed(lambda: plain.execute(INSERT, (BODY,))))
+            inserts.append(timed(lambda: plain.execute(INSERT)))
 
-        ours = _served(tree, f"--store={it.new_database()}", between=insert)
-    theirs = percentiles(inserts)
-    beside = theirs, 1 / theirs.p50
-    yield from _rows(", on PostgreSQL", ours, beside, "INSERT", "≤ 1.3×", "≥ 5,000 /s")
+        ours = _served(f"--store={it.new_database()}", between=insert)
+    theirs = p50(inserts), p99(inserts), 1 / p50(inserts)
+    yield from _rows(", on PostgreSQL", ours, theirs, "INSERT", "≤ 1.3×", "≥ 5,000 /s")
 
 
-def recorded(tree: Path) -> Iterator[Row]:
+def recorded() -> Rows:
     """Commands to a server that writes a telemetry log, or a record; beside one that does not."""
-    plain = _served(tree)
+    plain = _served()
     for option in ("--tlog", "--record"):
-        yield from _rows(f", {option}", _served(tree, f"{option}=here"), plain, "without")
+        yield from _rows(f", {option}", _served(f"{option}=here"), plain, "without", "", "")
 
 
-def _rows(of: str, ours: Acks, beside: Acks, yardstick: str, *goals: str) -> Iterator[Row]:
-    time_goal, rate_goal = goals or ("", "")
-    (times, acks), (their, most) = ours, beside
-    yield Row(f"command → ack{of}, p50", times.p50, "µs", their.p50, yardstick, time_goal)
-    yield Row(f"command → ack{of}, p99", times.p99, "µs", their.p99, yardstick)
-    what = f"acks, {OUTSTANDING} outstanding{of}"
-    yield Row(what, acks, "/s", most, yardstick.partition(" ")[0], rate_goal)
+def _rows(of: str, ours: Acks, beside: Acks, yardstick: str, *goals: str) -> Rows:
+    yield Row(f"command → ack{of}, p50", ours[0], "µs", beside[0], yardstick, goals[0])
+    yield Row(f"command → ack{of}, p99", ours[1], "µs", beside[1], yardstick)
+    what, yardstick = f"acks, {OUTSTANDING} outstanding{of}", yardstick.partition(" ")[0]
+    yield Row(what, ours[2], "/s", beside[2], yardstick, goals[1])
 
 
-def _served(tree: Path, *options: str, between: Callable[[], None] = lambda: None) -> Acks:
-    with introduced(tree, *options) as (_, client, rover):
-        return _acknowledged(client, ACK, rover.live, between)
+def _served(*options: str, between: Callable[[], None] = lambda: None) -> Acks:
+    with introduced(*options) as (_, client, rover):
+        return _acknowledged(client, m.CommandAck.id, rover.beat, between)
 
 
 def _echo() -> Acks:
-    with bare() as it, Speaker(to=it.port) as client:
-        return _acknowledged(client, m.CommandLong.id, lambda: None, lambda: None)
+    with bare() as it, Peer(to=it.port) as client:
+        return _acknowledged(client, m.CommandLong.id, client.beat, lambda: None)
 
 
 def _acknowledged(
-    client: Speaker, answer: int, live: Callable[[], None], between: Callable[[], None]
+    client: Peer, answer: int, live: Callable[[], None], between: Callable[[], None]
 ) -> Acks:
-    """Return the seconds of one command at a time, and answers/s with many under way."""
     total = WARM_UP + ONE_BY_ONE + MANY
     packed = iter([client.encode(move(nonce)) for nonce in range(1, total + 1)])
     times = []
@@ -137,107 +154,150 @@ def _acknowledged(
         between()
         times.append(effect(client, packet, answer, at=client))
     acks = rate(client, client, packed, lambda data: data[7] == answer, live)
-    return percentiles(times[WARM_UP:]), acks
+    return p50(times[WARM_UP:]), p99(times[WARM_UP:]), acks
 
 
-def forwarding(tree: Path) -> Iterator[Row]:
+def forwarding() -> Rows:
     """Packets a second from rover to client, in a window; beside a bare forwarder."""
-    packets, found = list(islice(_packets(), PACKETS)), []
-    for way in (introduced(tree), _forwarder()):
+    packets, found = list(islice(_telemetry(), PACKETS)), []
+    for way in (introduced(), _forwarder()):
         with way as (_, client, rover):
-            found.append(rate(rover, client, packets, lambda data: data[5:7] == b"\x01\x01"))
+            is_rover: Callable[[bytes], bool] = lambda data: data[5:7] == b"\x01\x01"  # noqa: E731
+            found.append(rate(rover, client, iter(packets), is_rover, client.beat))
     yield Row("rover → client packets", found[0], "/s", found[1], "forwarder", "≥ 0.9×")
 
 
+def telemetry() -> Rows:
+    """Processor time for telemetry of 1 to 100 rovers and one station; beside a forwarder."""
+    for rovers in ROVERS:
+        found = []
+        for way in (introduced(), _forwarder()):
+            with way as (it, station, rover):
+                _forwarded(SETTLING, rovers, station, rover)
+                used = it.seconds()
+                seconds = timed(lambda: _forwarded(WATCHED, rovers, station, rover))  # noqa: B023
+                found.append((it.seconds() - used) / seconds)
+        what = f"processor for {rovers} rovers, {RATE} packets/s each, of a core"
+        yield Row(what, found[0], "%", found[1], "forwarder")
+
+
+def _forwarded(seconds: float, rovers: int, station: Peer, rover: Rovers) -> None:
+    """Send telemetry of rovers evenly, and answer what the server asks."""
+    packets = _telemetry(rovers)
+    for _ in paced(RATE, range(round(seconds * RATE))):
+        station.beat()
+        for packet in islice(packets, rovers):
+            rover.send(packet)
+        station.drain()
+        for data in rover.drain():
+            rover.answer(data)
+
+
 @contextmanager
-def _forwarder() -> Iterator[tuple[Process, Speaker, Rovers]]:
-    with Rovers() as rover, Speaker() as client, bare(client.port) as it:
-        rover.socket.connect((HOST, it.port))
+def _forwarder() -> Iterator[tuple[Process, Peer, Rovers]]:
+    with Rovers() as rover, Peer() as client, bare(client.port) as it:
+        rover.connect((HOST, it.port))
+        client.connect((HOST, it.port))
         yield it, client, rover
 
 
-def _packets(rovers: int = 1) -> Iterator[bytes]:
-    """Yield telemetry without end, of one rover after another: RATE packets a second, a beat."""
+def _telemetry(rovers: int = 1) -> Iterator[bytes]:
+    """Yield packets without end, of one rover after another: RATE packets a second, a beat."""
     encoders = [Encoder(Address(number, 1)).encode for number in range(1, rovers + 1)]
     for turn in count():
         for at, encode in enumerate(encoders, turn):
             yield encode(TELEMETRY[at % len(TELEMETRY)] if at % RATE else STANDING)
 
 
-def telemetry(tree: Path) -> Iterator[Row]:
-    """Processor time for telemetry of 1 to 100 rovers and one station; beside a forwarder."""
-    for rovers in ROVERS:
-        with _forwarder() as (it, station, rover):
-            their = _share(it, rovers, rover, station, lambda: None)
-        with introduced(tree) as (it, station, rover):
-            ours = _share(it, rovers, rover, station, station.beat)
-        what = f"processor for {rovers} rovers, {RATE} packets/s each, of a core"
-        yield Row(what, ours, "%", their, "forwarder")
-
-
-def _share(
-    it: Process, rovers: int, rover: Rovers, station: Speaker, live: Callable[[], None]
-) -> float:
-    """Return the processor seconds a second of a process that forwards the telemetry, evenly."""
-    packets = _packets(rovers)
-    begin = began = monotonic()
-    used = 0.0
-    for number in range(round((SETTLING + WATCHED) * RATE)):
-        live()
-        for packet in islice(packets, rovers):
-            rover.socket.send(packet)
-        station.drain()
-        for data in rover.drain():
-            rover.answer(data)
-        if number == round(SETTLING * RATE):
-            began, used = monotonic(), it.seconds()
-        sleep(max(0.0, begin + (number + 1) / RATE - monotonic()))
-    return (it.seconds() - used) / (monotonic() - began)
-
-
-def start(tree: Path) -> Iterator[Row]:
+def start() -> Rows:
     """From nothing to the first heartbeat, to help, to a script's first line; beside python -c."""
 
     def ran(*words: str) -> float:
-        command = [sys.executable, *words]
-        run = partial(
-            subprocess.run, command, check=True, stdout=subprocess.DEVNULL, env=environment(tree)
-        )
-        return median([timed(run) for _ in range(STARTS + 1)][1:])  # the first fills the cache
+        run = partial(subprocess.check_output, [sys.executable, *words])
+        return p50([timed(run) for _ in range(STARTS + 1)][1:])  # the first fills the cache
 
     python = ran("-c", "pass")
     dialect, library = ran("-c", "import mav_tasks.mavlink._dialect"), ran("-c", LIBRARY)
-    for what, seconds, goal in (
-        ("server start → first heartbeat", _first_heartbeat(tree), "≤ 1,000 ms"),
+    rows = [
+        ("server start → first heartbeat", _first_heartbeat(), "≤ 1,000 ms"),
         ("mav-tasks --help", ran(*CLI, "--help"), "≤ 300 ms"),
         ("import mav_tasks", ran("-c", "import mav_tasks") - python, "≤ 150 ms"),
         (f"{LIBRARY}, but for the dialect", library - dialect, "≤ 150 ms"),
         (f"{LIBRARY}, all of it", library - python, ""),
-    ):
-        yield Row(what, seconds, "ms", python, "python -c pass", goal)
-    with simulated_rovers(1) as rover, server(tree, rover) as it:
+    ]
+    with simulated_rovers(1) as rover, server(rover) as it:
         it.wait_for("rover 1: found")
-        for call in CALLS:
-            words = (*CLI, *call.split(), f"--server=udpout:{HOST}:{it.port}")
-            yield Row(f"mav-tasks {call}", ran(*words), "ms", python, "python -c pass", "≤ 250 ms")
+        to = f"--server=udpout:{HOST}:{it.port}"
+        rows += [(f"mav-tasks {call}", ran(*CLI, *call.split(), to), "≤ 250 ms") for call in CALLS]
+    for what, seconds, goal in rows:
+        yield Row(what, seconds, "ms", python, "python -c pass", goal)
 
 
-def _first_heartbeat(tree: Path) -> float:
+def _first_heartbeat() -> float:
     """Return the seconds from a server's start to its first packet at a pushed client."""
     times = []
     for _ in range(STARTS):
-        with Speaker() as client, Rovers() as rover:
+        with Peer() as client, Rovers() as rover:
             begin = perf_counter()
-            with server(tree, rover.port, f"--push={HOST}:{client.port}"):
-                rover.connect()
-                while client.socket not in select([client.socket, rover.socket], [], [], 9.0)[0]:
-                    rover.answer(rover.socket.recv(2048))
+            with server(rover.port, f"--push={HOST}:{client.port}"):
+                rover.wait()
+                while client not in select([client, rover], [], [], 9.0)[0]:
+                    rover.answer(rover.recv(2048))
                 times.append(perf_counter() - begin)
-    return median(times)
+    return p50(times)
 
 
-def timed(do: Callable[[], object]) -> float:
-    """Return the seconds of a call."""
-    begin = perf_counter()
-    do()
-    return perf_counter() - begin
+def uploads() -> Rows:
+    """Uploads by MAVSDK → durable acknowledgement; beside MAVSDK's server, which keeps no file.
+
+    Both figures include the client's own cost.
+    """
+    log_subscribe(lambda *_: True)  # it logs to our output
+    (port,) = free_udp_ports(1)
+    times = defaultdict[tuple[int, int], list[float]](list)
+    with (
+        beside(_mission_server, port),
+        simulated_rovers(1) as rover,
+        server(rover, "--store=tasks.sqlite3") as it,
+        ExitStack() as stack,
+    ):
+        it.wait_for("rover 1: found")
+        found = (
+            stack.enter_context(_mavsdk(ComponentType.GROUND_STATION, f"udpout://{HOST}:{each}"))
+            for each in (it.port, port)
+        )
+        ends = [MissionRaw(each.first_autopilot(FIND_WITHIN)) for each in found]
+        for number in range(FIRST + UPLOADS):
+            for size in SIZES:
+                items = _items(size, number)
+                for at, end in enumerate(ends):
+                    sleep(BETWEEN)  # an upload raises unless it is accepted
+                    times[size, at].append(timed(lambda: end.upload_mission(items)))  # noqa: B023
+        assert all(len(end.download_mission()) == size for end in ends)
+    for size in SIZES:
+        ours, theirs = (p50(times[size, at][FIRST:]) for at in (0, 1))
+        what = f"upload of {size} items → durable ack, p50"
+        yield Row(what, ours, "ms", theirs, "MAVSDK's server", "≤ 2×")
+
+
+@contextmanager
+def _mavsdk(kind: Any, url: str) -> Iterator[Any]:
+    with Mavsdk(Configuration.create_with_component_type(kind)) as made:
+        made.add_any_connection(url)
+        yield made
+
+
+def _mission_server(port: int) -> None:
+    with _mavsdk(ComponentType.AUTOPILOT, f"udpin://{HOST}:{port}") as it:
+        server = MissionRawServer(it.server_component())
+        signal.pause()
+        server.destroy()
+
+
+def _items(size: int, number: int) -> list[Any]:
+    """Return a line of waypoints, a metre apart; items of different numbers are all different."""
+    y = LONGITUDE + METRE * number
+    return [
+        MissionItem(seq=seq, current=int(seq == 0), x=LATITUDE + METRE * seq, y=y, **WAYPOINT)
+        for seq in range(size)
+    ]

@@ -6,23 +6,19 @@ at the web process to the frame in which the page has painted it.
 """
 
 import gzip
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
-from pathlib import Path
-from statistics import median
+from time import monotonic, sleep, time
 from typing import Any
+from urllib.request import urlopen
 
-from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
 from tests.kit import chromium
 
 from .driving import PERIOD, driven
-from .load import EVENTS, asked, faced, held
-from .processes import HOST, beside, server, simulated_rovers
-from .rows import Row, percentiles
-from .wire import Rovers
+from .harness import HOST, Rovers, Row, Rows, beside, p50, p99, server, simulated_rovers
+from .load import EVENTS, faced, held
 
 BROWSERS, ROVERS = 50, 100
 STOPS, LOADS, ROUNDS = 20, 10, 3
@@ -51,22 +47,22 @@ EventSource.prototype.addEventListener = function (kind, listener, ...rest) {
 """
 
 
-def measure(tree: Path) -> Iterator[Row]:
+def web() -> Rows:
     """Size, first paint, STOP in the page, packet → pixel, setpoints; with 50 browsers."""
     with chromium.running() as browser:
-        with Rovers() as rover, server(tree, rover.port) as it, faced(tree, "web", it.port) as web:
-            rover.connect()
-            yield from _loads(browser, f"http://{HOST}:{web[1]}/", rover)
-            alone, crowd = (_pressed(browser, web[1], rover, each) for each in (1, BROWSERS))
+        with Rovers() as rover, server(rover.port) as it, faced("web", it.port) as page:
+            rover.wait()
+            yield from _loads(browser, page.port, rover)
+            alone, crowd = (_pressed(browser, page.port, rover, each) for each in (1, BROWSERS))
             what = f"STOP in the page → HOLD at the rover, {BROWSERS} browsers"
-            yield Row(f"{what}, p50", median(crowd), "ms", median(alone), "with one")
+            yield Row(f"{what}, p50", p50(crowd), "ms", p50(alone), "with one")
             yield Row(f"{what}, longest", max(crowd), "ms", max(alone), "with one", "≤ 50 ms")
-        yield _painted(tree, browser)
-    yield _driven(tree)
+        yield _painted(browser)
+    yield _driven()
 
 
-def _loads(browser: Any, url: str, rover: Rovers) -> Iterator[Row]:
-    paints = []
+def _loads(browser: Any, port: int, rover: Rovers) -> Rows:
+    paints, url = [], f"http://{HOST}:{port}/"
     for _ in range(LOADS):
         page = browser.new_context().new_page()
         page.goto(url)
@@ -77,9 +73,9 @@ def _loads(browser: Any, url: str, rover: Rovers) -> Iterator[Row]:
         files = {each for each in page.evaluate(FILES) if not each.endswith("/events")} | {url}
         page.context.close()
         _serve(rover)
-    size = sum(len(gzip.compress(asked(each))) for each in files)
+    size = sum(len(gzip.compress(urlopen(each).read())) for each in files)
     yield Row("web page, gzipped", size, "kB", goal="≤ 250 kB")
-    yield Row("first paint, median", median(paints), "ms", goal="≤ 500 ms")
+    yield Row("first paint, median", p50(paints), "ms", goal="≤ 500 ms")
 
 
 def _pressed(browser: Any, port: int, rover: Rovers, browsers: int) -> list[float]:
@@ -92,8 +88,8 @@ def _pressed(browser: Any, port: int, rover: Rovers, browsers: int) -> list[floa
         for _ in range(STOPS):
             pressed = page.evaluate(PRESS)
             times.append(_serve(rover, until_hold=True) - pressed)
-            end = time.monotonic() + BETWEEN
-            while time.monotonic() < end:
+            end = monotonic() + BETWEEN
+            while monotonic() < end:
                 _serve(rover)
         page.close()
     return times
@@ -105,51 +101,50 @@ def _serve(rover: Rovers, *, until_hold: bool = False) -> float:
     A STOP sends HOLD with a zero. Zeros alone come 20 times a second until the rover is seen to
     stand, which this one never is.
     """
-    rover.socket.settimeout(0.05)
+    rover.settimeout(0.05)
     while True:
-        rover.live()
-        try:
-            data = rover.socket.recv(2048)
-        except TimeoutError:
-            data = b""
-        now = time.time()
-        commands = [each for each in rover.answer(data) if isinstance(each, m.CommandLong)]
-        if not until_hold or any(each.command == MavCmd.DO_SET_MODE for each in commands):
+        rover.beat()
+        data = b""
+        with suppress(TimeoutError):
+            data = rover.recv(2048)
+        now = time()
+        asked = {getattr(each, "command", None) for each in rover.answer(data)}
+        if not until_hold or MavCmd.DO_SET_MODE in asked:
             return now
 
 
-def _painted(tree: Path, browser: Any) -> Row:
+def _painted(browser: Any) -> Row:
     with (
         simulated_rovers(ROVERS) as rovers,
-        server(tree, rovers) as it,
-        faced(tree, "web", it.port) as (_, port),
+        server(rovers) as it,
+        faced("web", it.port) as shown,
     ):
         page = browser.new_page()
         page.add_init_script(WATCH)
-        page.goto(f"http://{HOST}:{port}/")
+        page.goto(f"http://{HOST}:{shown.port}/")
         page.wait_for_function(f"() => document.querySelectorAll('.card').length >= {ROVERS}")
         page.evaluate("window.pixels.length = 0")
         page.wait_for_timeout(WATCHED * 1000)
         pixels = page.evaluate("window.pixels")
         page.close()
-    note = f"p50 {median(pixels) * 1e3:.0f} ms, {len(pixels) / WATCHED:.0f} frames/s"
-    p99 = percentiles(pixels).p99
-    return Row(f"packet → pixel, p99, {ROVERS} rovers", p99, "ms", goal="≤ 150 ms", note=note)
+    note = f"p50 {p50(pixels) * 1e3:.0f} ms, {len(pixels) / WATCHED:.0f} frames/s"
+    what = f"packet → pixel, p99, {ROVERS} rovers"
+    return Row(what, p99(pixels), "ms", goal="≤ 150 ms", note=note)
 
 
-def _driven(tree: Path) -> Row:
+def _driven() -> Row:
     """Setpoints of a rover with and without browsers, in turns."""
 
     @contextmanager
     def watched(browsers: int, server: int) -> Iterator[None]:
-        with faced(tree, "web", server) as (_, port), beside(held, port, browsers, EVENTS, True):
-            time.sleep(1.0)
+        with faced("web", server) as it, beside(held, it.port, browsers, EVENTS, True):
+            sleep(1.0)
             yield
 
     found: dict[int, list[float]] = {0: [], BROWSERS: []}
     for browsers in [*found] * ROUNDS:
-        it = driven(tree, 1, meanwhile=partial(watched, browsers))
-        found[browsers].append(PERIOD + it.errors.p99)
-    without, crowd = (median(each) for each in found.values())
+        it = driven(1, meanwhile=partial(watched, browsers))
+        found[browsers].append(PERIOD + it.error)
+    without, crowd = (p50(each) for each in found.values())
     what = f"interval of setpoints, p99, {BROWSERS} browsers"
     return Row(what, crowd, "ms", without, "without", "≤ 1.05×")
