@@ -99,45 +99,34 @@ def _included(name: str) -> Iterator[str]:
 
 
 def _merge(base: list[Element], additions: Element) -> None:
-    """Add definitions that no file of the base has to the first file of the base."""
-    for enum in additions.iter("enum"):
-        known = _named(base, enum)
+    """Add enums and messages, and entries and extension fields of known ones, that no file has.
+
+    Base fields determine CRC_EXTRA, and stay.
+    """
+    for ours in [*additions.iter("enum"), *additions.iter("message")]:
+        known = [each for tree in base for each in tree.iter(ours.tag) if _is_like(each, ours)]
         if not known:
-            _section(base[0], "enums").append(enum)
+            _part(base[0], f"{ours.tag}s").append(ours)
             continue
-        taken = [entry.get(key) for same in known for entry in same for key in ("name", "value")]
-        for entry in enum.findall("entry"):
-            if entry.get("name") not in taken and entry.get("value") not in taken:
-                known[0].append(entry)
-    for message in additions.iter("message"):
-        known = _named(base, message)
-        if known:
-            _extend(known[0], message)
-        elif message.find("description") is None:
-            raise RuntimeError(f"pymavlink's {BASE} has no {message.get('name')} to extend")
-        else:
-            _section(base[0], "messages").append(message)
+        taken = [child for same in known for child in same]
+        missing = [
+            child
+            for child in ours
+            if child.get("name") and not any(_is_like(child, other) for other in taken)
+        ]
+        if missing and ours.find("extensions") is not None:
+            _part(known[0], "extensions")
+        known[0].extend(missing)
 
 
-def _named(base: list[Element], like: Element) -> list[Element]:
-    name = like.get("name")
-    return [each for tree in base for each in tree.iter(like.tag) if each.get("name") == name]
+def _is_like(one: Element, other: Element) -> bool:
+    """Return whether both have the same name, or the same value."""
+    return any(one.get(key, "") == other.get(key) for key in ("name", "value"))
 
 
-def _section(tree: Element, tag: str) -> Element:
-    section = tree.find(tag)
-    return ElementTree.SubElement(tree, tag) if section is None else section
-
-
-def _extend(known: Element, message: Element) -> None:
-    """Append missing extension fields; base fields determine CRC_EXTRA and stay."""
-    names = {field.get("name") for field in known.iter("field")}
-    is_extension = False
-    for child in message:
-        if is_extension and child.get("name") not in names:
-            _section(known, "extensions")
-            known.append(child)
-        is_extension |= child.tag == "extensions"
+def _part(tree: Element, tag: str) -> Element:
+    part = tree.find(tag)
+    return ElementTree.SubElement(tree, tag) if part is None else part
 
 
 def _generated(source: Path) -> str:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega, common
 
-from generators.tables import full_policy
+from generators.documents import full_policy
 from mav_tasks.config.settings import ROLES, Clients, Limits, Roles, Settings
 from mav_tasks.mavlink import messages as m
 from mav_tasks.shell.in_memory import VEHICLE_LINK

@@ -122,11 +122,11 @@ def driven(
             servers.append(stack.enter_context(running))
         for index, it in enumerate(servers):
             _drive(it, 1 + index * rovers, rovers)
-        stack.enter_context(meanwhile(servers[0].port))
-        memory, used, began = servers[0].memory(), _used(servers, base), monotonic()
-        sleep(SECONDS)
-        grown = servers[0].memory() - memory
-        cores = [(b - a) / SECONDS for a, b in zip(used, _used(servers, base), strict=True)]
+        with meanwhile(servers[0].port):
+            memory, used, began = servers[0].memory(), _used(servers, base), monotonic()
+            sleep(SECONDS)
+            grown = servers[0].memory() - memory
+            cores = [(b - a) / SECONDS for a, b in zip(used, _used(servers, base), strict=True)]
         for it in servers:
             it.end()
         sent = [each for it in servers for each in json.loads(it.text.splitlines()[-1])]

@@ -23,7 +23,7 @@ SCRIPT = """
 import sys
 from dataclasses import asdict
 from math import radians
-from generators.tables import parameters
+from generators.documents import parameters
 from mav_tasks import __file__ as where
 from mav_tasks.cli.app import app
 from mav_tasks.config.configuration import Sources
