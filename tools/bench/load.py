@@ -64,11 +64,16 @@ CALL = (
 OF_CALL = "MCP-Protocol-Version: 2026-07-28\r\nMCP-Method: tools/call\r\nMCP-Name: stop\r\n"
 
 
-def http(path: str, body: bytes = b"", more: str = "", *, method: str = "POST") -> bytes:
-    """Return a request, with more lines in its head."""
-    head = f"{method} {path} HTTP/1.1\r\nHost: {HOST}\r\nContent-Length: {len(body)}\r\n{more}"
+def http(port: int, path: str, body: bytes = b"", more: str = "", *, method: str = "POST") -> bytes:
+    """Return a request to a port of ours, with more lines in its head."""
+    head = f"{method} {path} HTTP/1.1\r\nHost: {HOST}:{port}\r\nContent-Length: {len(body)}\r\n"
     head += "Content-Type: application/json\r\nAccept: application/json, text/event-stream\r\n"
-    return f"{head}Connection: close\r\n\r\n".encode() + body
+    return f"{head}{more}Connection: close\r\n\r\n".encode() + body
+
+
+def events(port: int) -> bytes:
+    """Return a request of the stream that a page reads."""
+    return http(port, "/api/v1/events", method="GET")
 
 
 def held(port: int, number: int, request: bytes = b"", is_read: Any = 0) -> None:
@@ -118,7 +123,6 @@ def noise(fd: int) -> None:
         sleep(0.01)
 
 
-EVENTS = http("/api/v1/events", method="GET")
 #: what a kind of load does to a port, and with what
 Kinds = dict[str, tuple[Any, ...]]
 SILENT: Kinds = {"silent": (held, 1100)}
@@ -129,18 +133,26 @@ LINK: Kinds = {
     "whole packets": (held, 1100, b"\xfd\x09" + bytes(19)),  # wrong CRC
     "churn": (repeated, b"\xfd\x09noise", 0.002),
 }
-PAGE: Kinds = {
-    **HALF,
-    "half a body": (held, 900, http("/api/v1/stop", b"{        ")[:-8]),
-    "unread streams": (held, 300, EVENTS),
-    "large bodies": (posted, http("/api/v1/plans", LARGE)),
-    "changes": (posted, http("/api/v1/vehicles/1/tasks", TASK)),
-}
-AGENTS: Kinds = {
-    **HALF,
-    "half a call": (held, 900, http("/mcp", b"{        ")[:-8]),
-    "sessions": (posted, http("/mcp", SESSION), 4),
-}
+
+
+def page(port: int) -> Kinds:
+    """Return the kinds of load on the page and its API."""
+    return {
+        **HALF,
+        "half a body": (held, 900, http(port, "/api/v1/stop", b"{ ")[:-1]),
+        "unread streams": (held, 300, events(port)),
+        "large bodies": (posted, http(port, "/api/v1/plans", LARGE)),
+        "changes": (posted, http(port, "/api/v1/vehicles/1/tasks", TASK)),
+    }
+
+
+def agents(port: int) -> Kinds:
+    """Return the kinds of load on MCP over HTTP."""
+    return {
+        **HALF,
+        "half a call": (held, 900, http(port, "/mcp", b"{ ")[:-1]),
+        "sessions": (posted, http(port, "/mcp", SESSION), 4),
+    }
 
 
 def load() -> Rows:
@@ -148,17 +160,17 @@ def load() -> Rows:
     most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, most[1]), most[1]))
     yield from _links()
-    for face, kinds, request in (
-        ("web", PAGE, http("/api/v1/stop", b"{}")),
-        ("mcp", AGENTS, http("/mcp", CALL, OF_CALL)),
+    for face, kinds, path, body, more in (
+        ("web", page, "/api/v1/stop", b"{}", ""),
+        ("mcp", agents, "/mcp", CALL, OF_CALL),
     ):
         with _server() as it, faced(face, it.port) as own:
             dial = partial(socket.create_connection, (HOST, own.port))
-            words = b"acknowledged|STOP is in force"
-            stop = partial(answered, dial, request, words, PATIENCE_HTTP)
-            while stop() == inf:
+            request, words = http(own.port, path, body, more), b"acknowledged|STOP is in force"
+            ask = partial(answered, dial, request, words, PATIENCE_HTTP)
+            while ask() == inf:
                 sleep(0.2)
-            yield from _loaded(face, kinds, own, stop, own.port, APART_HTTP)
+            yield from _loaded(face, kinds(own.port), own, ask, own.port, APART_HTTP)
     resource.setrlimit(resource.RLIMIT_NOFILE, most)
 
 

@@ -18,7 +18,7 @@ from tests.kit import chromium
 
 from .driving import PERIOD, driven
 from .harness import HOST, Rovers, Row, Rows, beside, p50, p99, server, simulated_rovers
-from .load import EVENTS, faced, held
+from .load import events, faced, held
 
 BROWSERS, ROVERS = 50, 100
 STOPS, LOADS, ROUNDS = 20, 10, 3
@@ -81,7 +81,7 @@ def _loads(browser: Any, port: int, rover: Rovers) -> Rows:
 def _pressed(browser: Any, port: int, rover: Rovers, browsers: int) -> list[float]:
     """Return the seconds from pressing STOP in the page to HOLD at the rover."""
     times = []
-    with beside(held, port, browsers - 1, EVENTS, True):
+    with beside(held, port, browsers - 1, events(port), True):
         page = browser.new_page()
         page.goto(f"http://{HOST}:{port}/")
         page.wait_for_selector(".card")
@@ -137,7 +137,7 @@ def _driven() -> Row:
 
     @contextmanager
     def watched(browsers: int, server: int) -> Iterator[None]:
-        with faced("web", server) as it, beside(held, it.port, browsers, EVENTS, True):
+        with faced("web", server) as it, beside(held, it.port, browsers, events(it.port), True):
             sleep(1.0)
             yield
 
