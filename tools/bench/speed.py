@@ -162,8 +162,10 @@ def forwarding() -> Rows:
     packets, found = list(islice(_telemetry(), PACKETS)), []
     for way in (introduced(), _forwarder()):
         with way as (_, client, rover):
-            is_rover: Callable[[bytes], bool] = lambda data: data[5:7] == b"\x01\x01"  # noqa: E731
-            found.append(rate(rover, client, iter(packets), is_rover, client.beat))
+            came = rate(
+                rover, client, iter(packets), lambda it: it[5:7] == b"\x01\x01", client.beat
+            )
+            found.append(came)
     yield Row("rover → client packets", found[0], "/s", found[1], "forwarder", "≥ 0.9×")
 
 
