@@ -3,7 +3,6 @@
     tools/mutants.py --count 200 --seed 1 --out figures.json         by all tests that only compute
     tools/mutants.py --count 200 --seed 1 --only tests/scenarios     by these tests alone
     tools/mutants.py --mutants figures.json --only tests/unit        the survivors of a run, again
-    tools/mutants.py --show 17 --seed 1                              print one mutant
 
 The mutants are a random sample, the same for the same seed and source. First each test runs once,
 which records the mutants whose lines it reaches; then for each mutant those tests run, quick ones
@@ -247,7 +246,7 @@ def main() -> None:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    for name, default in (("count", 200), ("seed", 1), ("jobs", 2), ("show", None)):
+    for name, default in (("count", 200), ("seed", 1), ("jobs", 2)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--only", nargs="*", default=["tests"], metavar="PATH")
     for name in ("mutants", "out"):
@@ -255,10 +254,6 @@ def main() -> None:
     options = parser.parse_args()
     again = options.mutants
     mutants = survivors(again) if again else sample(options.count, options.seed)
-    if options.show is not None:
-        mutant = mutants[options.show]
-        lines = (ROOT / mutant.path).read_text(encoding="utf-8").splitlines()
-        return print(mutant, lines[mutant.line - 1], sep="\n")
     os.chdir(ROOT)
     for path in options.only:
         if not Path(path.partition("::")[0]).exists():
@@ -280,7 +275,6 @@ def main() -> None:
         print(f"survives: {each['path']}:{each['line']} {each['function']}: {each['what']}")
     if options.out:
         options.out.write_text(json.dumps(results, indent=1), encoding="utf-8")
-    return None
 
 
 if __name__ == "__main__":
