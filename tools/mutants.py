@@ -232,11 +232,12 @@ def reached(mutants: list[Mutant], paths: list[str], jobs: int) -> list[list[tup
 
 def attempt(mutant: Mutant, tests: list[tuple[float, str]]) -> dict[str, Any]:
     """Run the tests that reach a mutant until one fails."""
-    what = {**mutant._asdict(), "reached by": len(tests), "killed by": None}
+    what = {**mutant._asdict(), "reached by": len(tests)}
     results = run([test for _, test in tests], {mutant.path: ([mutant.node], {})}) if tests else []
-    if results is None:
-        return {**what, "unmeasured": True}
-    return {**what, "killed by": next((test for test, _, passed, _ in results if not passed), None)}
+    what["killed by"] = next((test for test, _, passed, _ in results or () if not passed), None)
+    what |= {"unmeasured": True} if results is None else {}
+    print(json.dumps(what), flush=True)
+    return what
 
 
 def main() -> None:
@@ -260,17 +261,11 @@ def main() -> None:
             parser.error(f"no such file: {path}")
     tests = reached(mutants, options.only, options.jobs)
     with ThreadPoolExecutor(options.jobs) as pool:
-        results = []
-        for number, found in enumerate(pool.map(attempt, mutants, tests)):
-            results.append({"number": number, **found})
-            print(json.dumps(results[-1]), flush=True)
+        results = [*pool.map(attempt, mutants, tests)]
     measured = [each for each in results if "unmeasured" not in each]
     alive = [each for each in measured if not each["killed by"]]
-    never = [each for each in alive if not each["reached by"]]
-    print(
-        f"{len(measured) - len(alive)} of {len(measured)} killed; {len(never)} not reached;"
-        f" {len(mutants) - len(measured)} not measured"
-    )
+    print(f"{len(measured) - len(alive)} of {len(measured)} killed;", end=" ")
+    print(f"{tests.count([])} not reached; {len(mutants) - len(measured)} not measured")
     for each in alive:
         print(f"survives: {each['path']}:{each['line']} {each['function']}: {each['what']}")
     if options.out:
