@@ -75,6 +75,8 @@ class Halts:
         self.by_somebody = NOBODY
         self.at = -inf  #: s, when the last one came
         self.by: Hashable = None  #: sender of the command; None: no command
+        #: sender of the last halt, if that holds the vehicle; its cancels and clears change nothing
+        self.held_by: Hashable = None
         self.number = -1  #: of that command, in its sender's sequence
         self.command = 0  #: MAV_CMD of that command, if it is one
         self._numbers: dict[Hashable, int] = {}  # of the last halt of each sender
@@ -116,6 +118,8 @@ class Halts:
         self.epoch += 1
         self._counted_at = now
         self.by, self.number, self.command = None, -1, 0
+        if reason not in (TaskReason.CANCELLED, TaskReason.CLEARED):
+            self.held_by = None
         self._reason, self._actor, self.was_asked = reason, actor, False
         self.is_undone = False
         return True
@@ -125,15 +129,23 @@ class Halts:
         self.is_undone = self._reason is not TaskReason.DISARMED
         self.by_somebody = NOBODY
 
-    def was_said_by(self, sender: Hashable, number: int, *, command: int = 0) -> None:
+    def was_said_by(
+        self, sender: Hashable, number: int, *, command: int = 0, holds: bool = True
+    ) -> None:
         """Note the sender of the last halt, its command, and the number of that command.
 
+        ``holds``: it holds the vehicle, as a cancel does not: who has said no more than that may
+        not let it go.
         A late copy of an older halt of the same sender does not replace the last one.
         """
         before = self._numbers.get(sender, -1)
         if number >= before:
             self.command = command
         self.by, self.number = sender, max(number, before)
+        if holds:
+            self.held_by = sender
+        elif self.held_by is not sender:
+            self.held_by = None
         keep_latest(self._numbers, sender, self.number, most=SENDERS)
 
 

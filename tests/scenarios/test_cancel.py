@@ -1,5 +1,7 @@
 """Tasks are called off: promptly, visibly, and the rover stands before anything else begins."""
 
+from math import nan
+
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.config.settings import Queueing, Settings
@@ -12,7 +14,7 @@ from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DRIVE, MOVE, TEMPORARILY_REJECTED
-from tests.kit.world import World
+from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL, CLEAR = 54010, 54011
@@ -142,3 +144,25 @@ def test_a_client_has_a_quota_and_a_rover_a_capacity(make_world: MakeWorld) -> N
     assert mine[3].answer == (TEMPORARILY_REJECTED, R.QUOTA)
     assert theirs[1].answer == (TEMPORARILY_REJECTED, R.QUEUE_FULL)
     assert theirs[0].task_id == 4
+
+
+@for_each("word", [CANCEL, CLEAR])
+@for_each("whose", ["a person's", "another client's"])
+def test_who_only_cancels_may_not_end_anothers_halt_by_a_click(
+    world: World, word: int, whose: str
+) -> None:
+    other = world.add_client("other", system_id=200)
+    driving(world)
+    if whose == "a person's":
+        world.operator_mode(Mode.HOLD)
+    else:
+        other.pause()
+    world.run(3)
+    world.client.command(word, 1)
+    world.run(1)
+    click = world.client.command_int(192, -1, 1, 0, nan, **at(-3.0, 0.0), frame=6, target=(1, 1))
+    world.run(3)
+    assert world.state(click.task_id)[0] is S.QUEUED
+    assert world.stands()
+    other.proceed()
+    world.until_state(click.task_id, S.EXECUTING)

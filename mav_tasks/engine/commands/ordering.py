@@ -12,7 +12,7 @@ from math import inf, isfinite
 
 from mav_tasks.basics.errors import Rejection
 from mav_tasks.engine.clients.rights import SUBMITTER
-from mav_tasks.engine.commands.command_request import CommandRequest
+from mav_tasks.engine.commands.command_request import OF_ONE_TASK, CommandRequest
 from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.services.commands import COPIED, DOUBLED, Command
 from mav_tasks.mavlink.enums import MavCmd
@@ -118,7 +118,8 @@ def note_halt(asked: CommandRequest, *, before: int) -> None:
     halts = asked.vehicle.tasks.halts
     if halts.epoch != before or (halts.by is asked.sender and asked.kind is Kind.HALT):
         number = asked.sender.line.number_of(asked.packet.seq)
-        halts.was_said_by(asked.sender, number, command=asked.command.command)
+        command = asked.command.command
+        halts.was_said_by(asked.sender, number, command=command, holds=command not in OF_ONE_TASK)
 
 
 def _epoch_in(command: Command) -> int:

@@ -143,7 +143,7 @@ class Submissions:
         if not asked.rights.reach(OPERATOR):
             return False
         if tasks.paused:
-            return tasks.halts.by is asked.sender
+            return tasks.halts.held_by is asked.sender
         return vehicle.joint.state(now=now).is_led and vehicle.armed
 
     def refuse(
@@ -374,7 +374,7 @@ def give_back(asked: CommandRequest, *, now: float) -> None:
     Call this for a request that drives the vehicle at once.
     """
     tasks = asked.vehicle.tasks
-    is_over = tasks.paused in TAKEN or tasks.halts.by is asked.sender
+    is_over = tasks.paused in TAKEN or tasks.halts.held_by is asked.sender
     if is_over and not tasks.has_others:
         asked.vehicle.joint.go_on(actor=asked.actor, now=now)
 
