@@ -214,7 +214,7 @@ class Engine:
                 self._desks.nonce_taken(item, now=now)
                 self._any.nonce_taken(item, now=now)
             case inputs.SettingsChanged(settings=settings):
-                self._apply(self._parameters.configured(settings))
+                self._apply(self._parameters.configured(settings), now=now)
                 self.not_in_force = self._parameters.not_in_force
             case inputs.WallClock(offset=offset):
                 self.signatures.set_wall(offset)
@@ -477,7 +477,7 @@ class Engine:
         room, signatures = self._fleet.room, self.signatures
         if self._parameters.is_changed:
             self._parameters.is_changed = False
-            self._apply(self._parameters.settings)
+            self._apply(self._parameters.settings, now=now)
         woken_ids, room.woken = room.woken, set()
         for system_id in woken_ids:
             if woken := self._vehicles.get(system_id):
@@ -519,7 +519,7 @@ class Engine:
         if signatures.keep_at != self._keeping.at:
             self._keeping.set(signatures.keep_at)
 
-    def _apply(self, settings: Settings) -> None:
+    def _apply(self, settings: Settings, *, now: float) -> None:
         self._settings = settings
         self.signatures.apply(settings.signing.window)
         for apply in (
@@ -528,6 +528,9 @@ class Engine:
             self._publisher.apply,
         ):
             apply(settings)
+        for client in self._gcs.clients:
+            for vehicle in () if client.rights.may_drive else self._vehicles.all:
+                vehicle.joint.end_driving_of(client.key, now=now)
 
     def _note_stopped(self, *, now: float) -> None:
         rolling = tuple(v.system_id for v in self._vehicles.all if v.control.is_engaged)

@@ -1,5 +1,12 @@
-"""A client's own stop, HOLD, return, "go to" or mission ends what it drives by setpoints."""
+"""A client's own stop, HOLD, return, "go to" or mission ends what it drives by setpoints.
 
+So do the end of the server, and that of the client's right to drive.
+"""
+
+from collections.abc import Callable
+
+from mav_tasks.config.settings import Roles, Settings
+from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
 from tests.kit.cases import for_each
@@ -90,3 +97,26 @@ def test_a_queue_that_is_cleared_leaves_no_velocity_of_the_clients_behind(
     world.run(1.5)
     assert world.stands()
     assert world.mode() is Mode.HOLD
+
+
+def end_of_server(world: World) -> None:
+    assert set(world.last_words()) == {"zero", "HOLD"}, "also if its engine fails"
+    world.server.shut_down(now=world.now)
+
+
+def end_of_right(world: World) -> None:
+    settings = Settings(roles=Roles(unsigned="submitter"))
+    world.server.pump.handle(SettingsChanged(settings), now=world.now)
+
+
+@for_each("persona", [AP, PX])
+@for_each("end", [end_of_server, end_of_right])
+def test_the_end_of_the_server_or_of_its_right_stops_what_a_client_drives(
+    make_world: MakeWorld, persona: Persona, end: Callable[[World], None]
+) -> None:
+    world = drives(make_world, persona)
+    before = world.truth.north
+    end(world)
+    world.run(2.0)
+    assert world.stands()
+    assert world.truth.north - before < 0.6, "it does not roll until its own time-out"

@@ -46,6 +46,11 @@ class Rights(NamedTuple):
         """Whether the client's role is this one or a higher one."""
         return RANKS[self.role] >= RANKS[role]
 
+    @property
+    def may_drive(self) -> bool:
+        """Whether the client may drive by set-points of its own."""
+        return self.reach(OPERATOR) and not self.is_bound
+
     def require(self, role: str, what: str, *, moves: bool = False) -> None:
         """Raise Rejection unless the client's role is this one or a higher one.
 

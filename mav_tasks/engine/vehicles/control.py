@@ -286,6 +286,9 @@ TABLE = (
     ),
     _row(_E.OPERATOR_LOST, _F.FORGET_RELEASE, _F.FORGET_START, _F.TELL, _E.PAUSE),
     _row(_E.LEASE_ENDS, _E.DRIVING_ENDS, _F.OUTDATE, _F.STEP),
+    # nobody is left to repeat a zero to one that a client drives
+    _row(_E.CLOSE, _F.REVOKE, _F.LET_GO, grip=Grip.FREE, driver=Driver.CLIENT, work=NO_TASK_HAS_IT),
+    _row(_E.CLOSE, _F.REVOKE, _F.PAUSE, _F.LET_GO, grip=Grip.FREE, driver=Driver.CLIENT),
     _row(_E.CLOSE, _F.PAUSE, work=HAS_IT, grip=Grip.FREE),
     _row(_E.CLOSE, grip=Grip.FREE),
     _row(_E.CLOSE, _F.PAUSE, _F.BRAKE, work=HAS_IT),

@@ -250,6 +250,11 @@ class Vehicle:
         """
         self.requests.shut()
         self.pilot.close()
+        return self.is_driven
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether the server, or a client through it, may be driving it."""
         return self.control.is_engaged or self.parts.authority.has_any_grant
 
     def comes_anew(self) -> None:

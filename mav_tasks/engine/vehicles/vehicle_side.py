@@ -12,7 +12,7 @@ from math import inf
 
 from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import Outgoing, Peer, Place
-from mav_tasks.engine.services.orders import DRIVEN, Orders, Phase
+from mav_tasks.engine.services.orders import DRIVEN, Orders
 from mav_tasks.engine.services.persona import ARDUPILOT, Persona, persona_of
 from mav_tasks.engine.services.vehicle_status import gcs_heartbeat, kind_of
 from mav_tasks.engine.snapshot import Reach
@@ -124,8 +124,7 @@ class VehicleSide(VehicleLinks):
                 self._awaiting.pop(system_id, None)
             else:
                 self._awaiting[system_id] = vehicle
-            is_idle = vehicle.control.phase is Phase.IDLE
-            words = () if is_idle else vehicle.requests.emergency_stop_packets
+            words = vehicle.requests.emergency_stop_packets if vehicle.is_driven else ()
             if words != self._last_words[system_id]:
                 self._note_last_words(system_id, words)
         return touched
