@@ -1,77 +1,59 @@
 // Dialogues: below the bar with STOP, which stays in reach. Escape closes; the focus comes back.
 
-import { failureLine, focusNear, h } from "./dom.js";
+import { newKey } from "./api.js";
+import { button, failureLine, focusNear, h, make } from "./dom.js";
 
-const place = () => document.getElementById("dialogs");
+let open = null;
 
-// what is below a dialogue: neither the keyboard nor a screen reader reaches it
-const below = () => [document.getElementById("main"), document.querySelector(".views")];
+document.addEventListener("keydown", (event) => event.key === "Escape" && !open?.isNeeded && close());
 
 /**
- * Open a dialogue. "act" does what it is for, and may throw a Problem; then it stays open and says why.
- * "isBeside": it leaves the map in sight. "isNeeded": there is no way around it. "onClose" is called once it is gone, whatever was chosen.
- * @param {{title: string, words?: (string|Node)[], word: string, act: (form: any) => Promise<any>, fields?: Node, isBeside?: boolean, onClose?: () => void, isNeeded?: boolean}} what
+ * Open a dialogue. "act" does what it is for, and may throw a Problem; then it stays open and says why. The key is one
+ * for what is asked, however often it is tried. "isBeside": it leaves the map in sight. "isNeeded": there is no way
+ * around it. "onClose" is called once it is gone, whatever was chosen.
+ * @param {{title: string, words?: string[], word: string, act: (form: any, key: string) => Promise<any>, fields?: any[], isBeside?: boolean, onClose?: () => void, isNeeded?: boolean}} what
  */
-export function ask({ title, words = [], word, act, fields, isBeside = false, isNeeded = false, onClose = () => {} }) {
+export function ask({ title, words = [], word, act, fields = [], isBeside = false, isNeeded = false, onClose = () => {} }) {
   close();
   const before = document.activeElement;
+  const key = newKey();
   const failure = failureLine();
-  const go = h("button", { class: "small main-word", type: "submit" }, word);
-  const form = h("form", { class: "box", role: "dialog", "aria-labelledby": "dialog-title", tabIndex: -1, noValidate: true },
+  const go = make(h("button", { class: "small main-word", type: "submit" }, word));
+  const form = make(h("form", { class: "box", role: "dialog", "aria-labelledby": "dialog-title", tabindex: -1 },
     h("h2", { id: "dialog-title" }, title),
-    ...words.map((each) => (each instanceof Node ? each : h("p", {}, each))),
-    fields,
+    h("div", {}, words.map((each) => h("p", { key: each }, each))),
+    ...fields,
     failure.element,
-    h("div", { class: "row" }, !isNeeded && h("button", { class: "small", type: "button", onclick: () => close() }, "Back"), go));
-  form.addEventListener("submit", async (event) => {
+    h("div", { class: "row" }, !isNeeded && button("Back", close), go)));
+  form.onsubmit = async (event) => {
     event.preventDefault();
-    if (go.disabled) return;
-    const wrong = form.querySelector("input:invalid");
-    if (wrong) {
-      failure.tell(`${wrong.labels[0].firstChild.textContent}: ${wrong.validationMessage}`);
-      return wrong.focus();
-    }
     go.disabled = true;
-    if (await failure.trying(() => act(form))) close();
-    else go.disabled = false;
-  });
-  const cover = h("div", { class: isBeside ? "cover beside" : "cover" }, form);
-  document.addEventListener("keydown", onKey);
-  cover.addEventListener("pointerdown", (event) => event.target === cover && !isNeeded && close());
-  cover._before = before;
-  cover._isNeeded = isNeeded;
-  cover._onClose = onClose;
-  place().append(cover);
-  for (const each of below()) each.inert = true;
+    const isDone = await failure.trying(() => act(form, key));
+    go.disabled = false;
+    if (isDone) close();
+  };
+  const cover = make(h("div", { class: isBeside ? "cover beside" : "cover" }, form));
+  cover.onpointerdown = (event) => event.target === cover && !isNeeded && close();
+  open = { cover, before, around: before.closest("section"), isNeeded, onClose };
+  document.getElementById("dialogs").append(cover);
+  setInert(true);
   (form.querySelector("input:not(.quiet), select, textarea") ?? go).focus();
   return form;
 }
 
-function onKey(event) {
-  const form = place().querySelector("form");
-  if (event.key === "Escape" && form && !form.parentElement._isNeeded) close();
-  if (event.key === "Tab" && form) keepFocus(event, form);
-}
-
 /** Close the open dialogue. */
 export function close() {
-  document.removeEventListener("keydown", onKey);
-  const cover = place().firstElementChild;
-  if (!cover) return;
+  if (!open) return;
+  const { cover, before, around, onClose } = open;
+  open = null;
   cover.remove();
-  for (const each of below()) each.inert = false;
-  const before = cover._before && cover._before.isConnected ? cover._before : null;
-  if (before && before.checkVisibility()) before.focus();
-  else focusNear(before && before.parentElement);
-  cover._onClose();
+  setInert(false);
+  if (before.checkVisibility()) before.focus();
+  else focusNear(around);
+  onClose();
 }
 
-// STOP is part of the round, though it is not in the dialogue
-function keepFocus(event, form) {
-  const stops = [...document.querySelectorAll(".stop:not([hidden])")];
-  const all = [...form.querySelectorAll("button, input, select, textarea, a[href]"), ...stops].filter((each) => !each.disabled);
-  const at = all.indexOf(document.activeElement);
-  const next = all[(at + (event.shiftKey ? all.length - 1 : 1)) % all.length];
-  event.preventDefault();
-  next.focus();
+// what is below a dialogue: neither the keyboard nor a screen reader reaches it
+function setInert(isInert) {
+  for (const each of document.querySelectorAll(".skip, .main, .views")) each.inert = isInert;
 }

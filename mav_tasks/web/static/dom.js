@@ -1,53 +1,86 @@
-// Small helpers for the DOM. Data become text nodes only: nothing that others sent is read as HTML.
+// What the page shows, as a description of what is known: "draw" changes what differs, and nothing else. Data become
+// text nodes and attributes only: nothing that others sent is read as HTML.
 
 import { failureWords } from "./api.js";
 
 /**
- * Make an element. A property "on…" is a listener, "class" the class, "data-…"/"aria-…" an attribute.
- * @param {string} tag
- * @param {Record<string, any>} [properties]
- * @param {...(Node|string|number|null|undefined|false)} children
- * @returns {any}
+ * Describe an element. A property "on…" is a listener, "value" what a field has; others are attributes. "key" tells the
+ * rows of a list from each other; else the place among the children does, which a child that is false keeps free: no
+ * button becomes its neighbour between press and release.
  */
-export function h(tag, properties = {}, ...children) {
-  const element = document.createElement(tag);
-  for (const [name, value] of Object.entries(properties)) {
-    if (value === null || value === undefined || value === false) continue;
-    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name in element && !name.includes("-") && name !== "list") element[name] = value;
-    else element.setAttribute(name === "class" ? "class" : name, value === true ? "" : String(value));
+export const h = (tag, { key, ...properties } = {}, ...children) => ({ tag, key, properties, children });
+
+/** A button that is not the main one of its place. */
+export const button = (words, onclick, properties) => h("button", { class: "small", type: "button", onclick, ...properties }, words);
+
+/** Make an element of its description. */
+export const make = (child) => shown(undefined, child);
+
+/** Let an element show texts, descriptions and other elements: what stays keeps its focus, and what was typed into it. */
+export function draw(element, ...children) {
+  const focused = element.contains(document.activeElement) ? document.activeElement : null;
+  fill(element, children);
+  if (!focused) return;
+  if (!element.contains(focused) || !focused.checkVisibility()) focusNear(element);
+  else if (focused !== document.activeElement) focused.focus({ preventScroll: true });
+}
+
+function fill(element, children) {
+  if (!element._nodes) element.replaceChildren();
+  const before = element._nodes ?? new Map();
+  const after = new Map();
+  for (const [at, child] of children.flat().entries()) {
+    if (child) after.set(child.key ?? `at ${at}`, child);
   }
-  if (properties.class) element.className = properties.class;
-  element.append(...children.filter((child) => child !== null && child !== undefined && child !== false).map((c) => (c instanceof Node ? c : String(c))));
+  // first, so that what follows one that is gone is not moved: an element that is moved loses its focus
+  for (const [key, node] of before) {
+    if (isLike(node, after.get(key))) continue;
+    node.remove();
+    before.delete(key);
+  }
+  let place = element.firstChild;
+  for (const [key, child] of after) {
+    const node = shown(before.get(key), child);
+    if (node === place) place = place.nextSibling;
+    else element.insertBefore(node, place);
+    after.set(key, node);
+  }
+  element._nodes = after;
+}
+
+const isLike = (node, child) => node === child || (child?.tag ? child.tag === node._tag : child !== undefined && !(child instanceof Node) && node instanceof Text);
+
+function shown(node, child) {
+  if (child instanceof Node) return child;
+  if (!child.tag) {
+    const text = node ?? new Text();
+    if (text.data !== String(child)) text.data = child;
+    return text;
+  }
+  const element = node ?? Object.assign(document.createElement(child.tag), { _tag: child.tag });
+  fill(element, child.children); // first: a select can have the value of one of its options only
+  const before = element._properties ?? {};
+  for (const name of Object.keys({ ...before, ...child.properties })) {
+    const value = child.properties[name];
+    if (value !== before[name]) set(element, name, value);
+  }
+  element._properties = child.properties;
   return element;
 }
 
-/** Set a text only if it has changed, so that a screen reader does not read it again. */
-export function say(element, text) {
-  if (element.textContent !== text) element.textContent = text;
-}
-
-/** Set texts that follow each other, each of which stays on one line. */
-export function sayParts(element, parts) {
-  while (element.childElementCount > parts.length) element.lastElementChild.remove();
-  while (element.childElementCount < parts.length) element.append(h("span", { class: "part" }));
-  for (const [at, part] of parts.entries()) say(element.children[at], at < parts.length - 1 ? `${part} ·` : part);
-}
-
-/** Show or hide. */
-export function show(element, isShown) {
-  if (element.hidden !== isShown) return;
-  const hadFocus = !isShown && element.contains(document.activeElement);
-  element.hidden = !isShown;
-  if (hadFocus) focusNear(element.parentElement);
+function set(element, name, value) {
+  if (name.startsWith("on") || name === "value") element[name] = value ?? null;
+  else if (name === "style") element.style.cssText = value; // the attribute is none of those that the page may set
+  else if (value === undefined || value === null || value === false) element.removeAttribute(name);
+  else element.setAttribute(name, value === true ? "" : value);
 }
 
 /** A line that tells what failed. "trying" does something, and returns whether it did not fail. */
 export function failureLine() {
-  const element = h("p", { class: "failure", role: "alert", hidden: true });
+  const element = make(h("p", { class: "failure", role: "alert", hidden: true }));
   const tell = (words) => {
-    say(element, words);
-    show(element, Boolean(words));
+    draw(element, words);
+    element.hidden = !words;
   };
   const trying = async (act, wordsOf = failureWords) => {
     tell("");
@@ -67,47 +100,4 @@ export function focusNear(element) {
   let place = element;
   while (place && (place.hidden || !place.hasAttribute("tabindex"))) place = place.parentElement;
   (place ?? document.getElementById("main")).focus({ preventScroll: true });
-}
-
-/** Let the next "reconcile" update all elements of a list: something else that they show has changed. */
-export function renew(list) {
-  for (const row of list._rows?.values() ?? []) row.item = undefined;
-}
-
-/**
- * Make a list show items: elements of unchanged items stay as they are, with their focus.
- * @param {HTMLElement} list
- * @param {any[]} items
- * @param {(item: any) => string|number} keyOf
- * @param {(item: any) => {element: HTMLElement, update: (item: any) => void}} make
- */
-export function reconcile(list, items, keyOf, make) {
-  const known = list._rows ?? (list._rows = new Map());
-  const focused = list.contains(document.activeElement) ? document.activeElement : null;
-  const wanted = new Set(items.map(keyOf));
-  // first, so that what follows a row that is gone is not moved: an element that is moved loses its focus
-  for (const [key, row] of known) {
-    if (wanted.has(key)) continue;
-    row.element.remove();
-    known.delete(key);
-  }
-  let before = null;
-  for (const item of items) {
-    const key = keyOf(item);
-    let row = known.get(key);
-    if (!row) {
-      row = make(item);
-      known.set(key, row);
-    }
-    if (row.item !== item) {
-      row.update(item);
-      row.item = item;
-    }
-    const place = before ? before.nextSibling : list.firstChild;
-    if (place !== row.element) list.insertBefore(row.element, place);
-    before = row.element;
-  }
-  if (!focused || focused === document.activeElement) return;
-  if (!list.contains(focused)) focusNear(list);
-  else if (focused.checkVisibility()) focused.focus({ preventScroll: true });
 }

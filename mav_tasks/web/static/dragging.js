@@ -6,78 +6,69 @@ const EDGE = 48; // px from the edge of the pane, where it scrolls
 const FAST = 10; // px a frame, at most
 
 /**
- * Let a row be dragged.
- * @param {HTMLElement} row
- * @param {{grip: HTMLElement, may: () => boolean, rowAt: (element: Element) => HTMLElement|null, over: (row: HTMLElement|null) => void, drop: (row: HTMLElement) => void}} what
- *   "rowAt": the row that an element is in, null: none that it can be dropped on; "over" is told of each new one, and of
- *   null at the end; "drop" comes before that.
+ * Let the rows of a list be dragged that are "movable" and have a "grip".
+ * @param {HTMLElement} list
+ * @param {(row: HTMLElement|null, target: HTMLElement|null) => void} over is told of each new target; null: of none, and of no row at the end
+ * @param {(row: HTMLElement, target: HTMLElement) => void} drop comes before that
  */
-export function makeDraggable(row, { grip, may, rowAt, over, drop }) {
-  row.addEventListener("dragstart", (event) => event.preventDefault()); // of the link in it
-  row.addEventListener("pointerdown", (event) => {
-    const isByGrip = grip.contains(event.target);
-    if (event.button !== 0 || !event.isPrimary || !may()) return;
-    if (!isByGrip && (event.pointerType !== "mouse" || event.target.closest("button"))) return;
-    follow(event);
+export function makeDraggable(list, over, drop) {
+  list.addEventListener("dragstart", (event) => event.preventDefault()); // of a link
+  list.addEventListener("pointerdown", (event) => {
+    const row = event.target.closest(".movable");
+    const isOnRow = event.pointerType === "mouse" && !event.target.closest("button");
+    if (row && event.button === 0 && event.isPrimary && (isOnRow || event.target.closest(".grip"))) follow(row, event);
   });
 
-  function follow(pressed) {
-    const pane = row.closest(".pane");
+  function follow(row, pressed) {
+    const pane = list.closest(".pane");
+    const listeners = new AbortController();
     let isDragged = false;
     let target = null;
     let at = pressed;
-    const listeners = new AbortController();
 
     const look = () => {
       if (!row.isConnected) return end(); // it runs now, or somebody cancelled it
-      const element = document.elementFromPoint(at.clientX, at.clientY);
-      const found = element && rowAt(element);
+      const found = document.elementFromPoint(at.clientX, at.clientY)?.closest(".movable") ?? null;
       const next = found === row ? null : found;
       if (next === target) return;
       target = next;
-      over(target);
+      over(row, target);
     };
     const scroll = () => {
       if (listeners.signal.aborted) return;
       const { top, bottom } = pane.getBoundingClientRect();
-      const [above, below] = [top + EDGE - at.clientY, at.clientY - bottom + EDGE];
-      const by = above > 0 ? -above : below > 0 ? below : 0;
-      if (by) {
-        pane.scrollTop += Math.max(-FAST, Math.min(FAST, by / 4));
-        look();
-      }
+      const by = Math.min(at.clientY - top - EDGE, 0) + Math.max(at.clientY - bottom + EDGE, 0);
+      pane.scrollTop += Math.max(-FAST, Math.min(FAST, by / 4));
+      if (by) look();
       requestAnimationFrame(scroll);
-    };
-    const moved = (event) => {
-      if (event.pointerId !== pressed.pointerId) return;
-      at = event;
-      if (!isDragged) {
-        if (Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) < FEW) return;
-        isDragged = true;
-        row.classList.add("dragged");
-        scroll();
-      }
-      look();
     };
     const end = () => {
       listeners.abort();
       if (!isDragged) return;
-      row.classList.remove("dragged");
-      over(null);
+      over(null, null);
       // the click that follows on the row is none
       const stop = (event) => (event.preventDefault(), event.stopPropagation());
       row.addEventListener("click", stop, { capture: true, once: true });
       setTimeout(() => row.removeEventListener("click", stop, { capture: true }));
     };
-    const released = (event) => {
-      if (event.pointerId !== pressed.pointerId) return;
-      if (isDragged && target) drop(target);
+    const on = (kind, act) => document.addEventListener(kind, (event) => {
+      if (event.pointerId === pressed.pointerId) act(event);
+    }, { signal: listeners.signal });
+    on("pointermove", (event) => {
+      at = event;
+      if (!isDragged) {
+        if (Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) < FEW) return;
+        isDragged = true;
+        over(row, null);
+        scroll();
+      }
+      look();
+    });
+    on("pointerup", () => {
+      if (isDragged && target) drop(row, target);
       end();
-    };
-    const on = (kind, act) => document.addEventListener(kind, act, { signal: listeners.signal });
-    on("pointermove", moved);
-    on("pointerup", released);
-    on("pointercancel", (event) => event.pointerId === pressed.pointerId && end());
-    on("keydown", (event) => event.key === "Escape" && end());
+    });
+    on("pointercancel", end);
+    document.addEventListener("keydown", (event) => event.key === "Escape" && end(), { signal: listeners.signal });
   }
 }

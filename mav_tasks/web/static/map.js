@@ -3,14 +3,13 @@
 import { get, request } from "./api.js";
 import { confirmGoal, may } from "./acts.js";
 import { ask } from "./dialogs.js";
-import { h, say } from "./dom.js";
+import { button, draw, h, make } from "./dom.js";
 import { change, choose, dataAge, onChange, state } from "./store.js";
 import * as tracks from "./tracks.js";
 import { taskColour } from "./words.js";
 
 /* global L: Leaflet, loaded before this module */
 
-const hint = document.getElementById("map-hint");
 const follow = document.querySelector("#map-follow input");
 const METRES = 111318.845; // of a degree of latitude, as the server converts
 const OLD = 3; // s
@@ -27,7 +26,7 @@ let isPast = false; // a recorded run is shown
 const marks = new Map();
 
 export function begin() {
-  const tiles = state.session.tiles;
+  const { tiles } = state.session;
   hasTiles = Boolean(tiles);
   map = L.map("map", {
     crs: hasTiles ? L.CRS.EPSG3857 : L.CRS.Simple, preferCanvas: true, attributionControl: hasTiles, zoomSnap: 0.25,
@@ -36,9 +35,8 @@ export function begin() {
   });
   if (hasTiles) {
     map.attributionControl.setPrefix(false);
-    const attribution = document.createElement("span");
-    attribution.textContent = tiles.attribution; // a file may hold anything
-    L.tileLayer(tiles.url, { minNativeZoom: tiles.min_zoom, maxNativeZoom: tiles.max_zoom, maxZoom: 22, attribution: attribution.innerHTML }).addTo(map);
+    const attribution = make(h("span", {}, tiles.attribution)).innerHTML; // a file may hold anything
+    L.tileLayer(tiles.url, { minNativeZoom: tiles.min_zoom, maxNativeZoom: tiles.max_zoom, maxZoom: 22, attribution }).addTo(map);
   } else {
     grid().addTo(map);
   }
@@ -66,7 +64,11 @@ export function begin() {
   onChange(["chosen", "session"], centre);
   onChange(["vehicles", "chosen", "queues"], tracks.drawTracks);
   onChange(["vehicles", "queues", "chosen", "tasks"], tracks.drawGoals);
-  onChange(["chosen", "ground"], drawGround);
+  onChange(["chosen", "ground"], () => {
+    groundLayer.clearLayers();
+    const [ground, vehicle] = [state.grounds.get(state.chosen), state.vehicles.get(state.chosen)];
+    if (ground && vehicle) drawGround(groundLayer, ground, vehicle, { color: "#3b6fd4", weight: 2, opacity: 0.5, dashArray: "2 6" });
+  });
   setInterval(loadGround, REFRESH);
 }
 
@@ -74,15 +76,15 @@ export function begin() {
 export async function loadGround() {
   const vehicle = state.chosen;
   if (vehicle === null) return;
-  const parts = await Promise.allSettled(["fence", "rally", "mission"].map((part) => get(`/vehicles/${vehicle}/${part}`)));
-  const [fence, rally, mission] = parts.map((part) => (part.status === "fulfilled" ? part.value : null));
-  state.grounds.set(vehicle, { shapes: fence ? fence.shapes : [], places: rally ? rally.places : [], path: mission ? mission.path : [] });
+  const part = (name, key) => get(`/vehicles/${vehicle}/${name}`).then((found) => found[key], () => []);
+  const [fence, rally, path] = await Promise.all([part("fence", "shapes"), part("rally", "places"), part("mission", "path")]);
+  state.grounds.set(vehicle, { fence, rally, path });
   change("ground");
 }
 
 /** The point of the map for a place, of a rover's frame or on earth; null: not known. */
 function point(place, vehicle) {
-  const origin = vehicle ? vehicle.origin : null;
+  const origin = vehicle?.origin;
   const { latitude, longitude } = place.latitude === undefined && origin ? onEarth(origin, place.north, place.east) : place;
   const isKnown = (latitude ?? null) !== null;
   if (hasTiles) return isKnown ? [latitude, longitude] : null;
@@ -108,62 +110,45 @@ function placeAt(latlng, vehicle) {
   return vehicle ? { north: latlng.lat, east: latlng.lng } : null;
 }
 
-function here(vehicle) {
-  if (vehicle.north === null) return null;
-  if (!reference && vehicle.origin) reference = vehicle.origin;
+function here({ north, east, latitude, longitude, origin }) {
+  if (north === null) return null;
+  reference ??= origin;
   // the position in the local frame is the smoother one
-  if (vehicle.origin) return point({ north: vehicle.north, east: vehicle.east }, vehicle);
-  return point({ north: vehicle.north, east: vehicle.east, latitude: vehicle.latitude ?? undefined, longitude: vehicle.longitude ?? undefined }, vehicle);
+  return origin || latitude === null ? point({ north, east }, { origin }) : point({ north, east, latitude, longitude });
 }
 
 function drawRovers() {
   if (isPast) return;
   for (const vehicle of state.vehicles.values()) {
+    const { vehicle: id, heard, heading, control } = vehicle;
     const at = here(vehicle);
     if (!at) continue;
-    let mark = marks.get(vehicle.vehicle);
-    if (!mark) {
-      mark = makeMark(vehicle.vehicle, at);
-      marks.set(vehicle.vehicle, mark);
-    }
-    if (mark._at !== `${at}`) {
-      mark.setLatLng(at);
-      if (follow.checked && vehicle.vehicle === state.chosen) map.panTo(at, { animate: false });
-      mark._at = `${at}`;
-    }
-    const turn = `rotate(${vehicle.heading ?? 0}deg)`;
-    if (mark._turn !== turn) {
-      mark._svg.style.transform = turn;
-      mark._turn = turn;
-    }
+    const mark = marks.get(id) ?? makeMark(id, at, map);
+    marks.set(id, mark);
+    if (follow.checked && id === state.chosen && !mark.getLatLng().equals(at)) map.panTo(at, { animate: false });
     const age = dataAge(vehicle);
-    const isOld = !vehicle.heard || age === null || age > OLD || !state.stream.isOpen;
-    const kind = `rover-mark leaflet-marker-icon leaflet-zoom-animated leaflet-interactive${isOld ? " old" : vehicle.control === "stopped" ? " stopped" : ""}`;
-    const element = mark.getElement();
-    if (element && mark._kind !== kind) {
-      element.className = kind;
-      mark._kind = kind;
-    }
+    const isOld = !heard || age === null || age > OLD || state.stream !== "open";
+    turnMark(mark, at, heading, isOld ? "old" : control);
   }
   if (!isFitted && marks.size) fit();
 }
 
-function makeMark(id, at, layer = map) {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 28 28");
-  const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  shape.setAttribute("class", "shape");
-  shape.setAttribute("d", "M14 2 L23 25 L14 20 L5 25 Z");
-  svg.append(shape);
-  const icon = h("div", {}, svg, h("span", { class: "number" }, String(id)));
-  const mark = L.marker(at, { icon: L.divIcon({ html: icon, className: "rover-mark", iconSize: [28, 28], iconAnchor: [14, 14] }), keyboard: true, alt: `Rover ${id}`, title: `Rover ${id}` });
+function makeMark(id, at, layer) {
+  const shape = '<svg viewBox="0 0 28 28"><path class="shape" d="M14 2 L23 25 L14 20 L5 25 Z"/></svg>';
+  const icon = L.divIcon({ html: `${shape}<span class="number">${Number(id)}</span>`, className: "rover-mark", iconSize: [28, 28], iconAnchor: [14, 14] });
+  const mark = L.marker(at, { icon, keyboard: true, alt: `Rover ${id}`, title: `Rover ${id}` });
   mark.on("click", () => {
     choose(id);
     centre();
   });
-  mark.addTo(layer);
-  mark._svg = svg;
-  return mark;
+  return mark.addTo(layer);
+}
+
+function turnMark(mark, at, heading, kind) {
+  if (!mark.getLatLng().equals(at)) mark.setLatLng(at);
+  const element = mark.getElement();
+  for (const each of ["old", "stopped"]) element.classList.toggle(each, each === kind);
+  element.firstChild.style.transform = `rotate(${heading ?? 0}deg)`;
 }
 
 /** Look at all rovers. */
@@ -182,65 +167,38 @@ function centre() {
   const mark = marks.get(state.chosen);
   if (mark && isFitted) map.panTo(mark.getLatLng());
   const way = may("submit") ? `Click the map, or press Enter on it, to send rover ${state.chosen} there or to turn it.` : "";
-  say(hint, state.chosen === null ? "" : `${way}${hasTiles ? "" : " Grid in metres, north is up."}`);
+  draw(document.getElementById("map-hint"), state.chosen === null ? "" : `${way}${hasTiles ? "" : " Grid in metres, north is up."}`);
   loadGround();
-}
-
-function drawGround() {
-  groundLayer.clearLayers();
-  const ground = state.grounds.get(state.chosen);
-  const vehicle = state.vehicles.get(state.chosen);
-  if (!ground || !vehicle) return;
-  drawShapes(ground.shapes, vehicle, groundLayer);
-  drawRally(ground.places, vehicle, groundLayer);
-  const path = points(ground.path, vehicle);
-  if (path.length > 1) L.polyline(path, { color: "#3b6fd4", weight: 2, opacity: 0.5, dashArray: "2 6", interactive: false }).addTo(groundLayer);
 }
 
 const points = (places, vehicle) => places.map((place) => point(place, vehicle)).filter(Boolean);
 
-function drawRally(places, vehicle, layer) {
-  for (const at of points(places, vehicle)) L.circleMarker(at, { radius: 6, color: "#6a4fb3", weight: 2, fill: false }).bindTooltip("rally point").addTo(layer);
-}
-
-function drawShapes(shapes, vehicle, layer) {
-  for (const shape of shapes) {
-    const style = { color: shape.inclusion ? "#2f8f4e" : "#c4161c", weight: 2, fillOpacity: shape.inclusion ? 0.03 : 0.12, interactive: false };
-    if (shape.kind === "polygon") {
-      const corners = points(shape.points, vehicle);
-      if (corners.length > 2) L.polygon(corners, style).addTo(layer);
-    } else {
-      const at = point(shape.centre, vehicle);
-      // in the grid, a unit is a metre
-      if (at) L.circle(at, { ...style, radius: shape.radius }).addTo(layer);
-    }
+/** Draw a path, rally points and the shapes of a fence. */
+function drawGround(layer, { fence, rally, path }, vehicle, style) {
+  const way = points(path, vehicle);
+  if (way.length > 1) L.polyline(way, { ...style, interactive: false }).addTo(layer);
+  for (const at of points(rally, vehicle)) L.circleMarker(at, { radius: 6, color: "#6a4fb3", weight: 2, fill: false }).bindTooltip("rally point").addTo(layer);
+  for (const { kind, inclusion, radius, ...shape } of fence) {
+    const look = { color: inclusion ? "#2f8f4e" : "#c4161c", weight: 2, fillOpacity: inclusion ? 0.03 : 0.12, interactive: false };
+    const corners = points(kind === "polygon" ? shape.points : [shape.centre], vehicle);
+    if (kind === "polygon" && corners.length > 2) L.polygon(corners, look).addTo(layer);
+    if (kind !== "polygon" && corners.length) L.circle(corners[0], { ...look, radius }).addTo(layer); // in the grid, a unit is a metre
   }
 }
 
-/**
- * Show what a plan file would do; null: nothing. "beside" covers part of the map.
- * @param {any} plan
- * @param {Element} [beside]
- */
+/** Show what a plan file would do; null: nothing. The dialogue beside it covers part of the map. */
 export function preview(plan, beside) {
-  if (!previewLayer) return;
   previewLayer.clearLayers();
   if (!plan) return;
   const vehicle = state.vehicles.get(state.chosen);
-  const path = points(plan.path, vehicle);
-  if (path.length) {
-    L.polyline(path, { color: "#d1602d", weight: 4, interactive: false }).addTo(previewLayer);
-    for (const at of path) L.circleMarker(at, { radius: 4, color: "#d1602d", fillOpacity: 1, interactive: false }).addTo(previewLayer);
-  }
-  drawRally(plan.rally, vehicle, previewLayer);
-  drawShapes(plan.fence, vehicle, previewLayer);
+  drawGround(previewLayer, plan, vehicle, { color: "#d1602d", weight: 4 });
+  for (const at of points(plan.path, vehicle)) L.circleMarker(at, { radius: 4, color: "#d1602d", fillOpacity: 1, interactive: false }).addTo(previewLayer);
   const bounds = L.featureGroup(previewLayer.getLayers()).getBounds();
   if (bounds.isValid()) lookAt(bounds.pad(0.2), { maxZoom: hasTiles ? 20 : 4, paddingBottomRight: covered(beside) });
 }
 
 // how much of the map a dialogue covers from the right, else from below
 function covered(element) {
-  if (!element) return [0, 0];
   const box = element.getBoundingClientRect();
   const { left, right, bottom } = map.getContainer().getBoundingClientRect();
   const isBelow = box.width > (right - left) / 2;
@@ -249,7 +207,6 @@ function covered(element) {
 
 /** Show the track of one task; null: none. */
 export function showTrack(track) {
-  if (!taskTrackLayer) return;
   taskTrackLayer.clearLayers();
   if (!track) return;
   const vehicle = state.vehicles.get(track.vehicle);
@@ -266,24 +223,19 @@ export function showTrack(track) {
 }
 
 /**
- * Show the ways of a recorded run instead of the present; null: the present again.
- * Return a function that shows the rovers at a place of their ways; -1: before the first one.
+ * Show the ways of a recorded run instead of the present; null: the present again. Return what shows a rover at a place
+ * of its way; -1: before the first one.
  */
 export function showRun(run) {
-  if (!runLayer) return () => {};
   runLayer.clearLayers();
-  document.getElementById("map").classList.toggle("past", Boolean(run));
-  for (const layer of [trackLayer, goalLayer]) run ? layer.remove() : layer.addTo(map);
-  for (const mark of marks.values()) run ? mark.remove() : mark.addTo(map);
+  map.getContainer().classList.toggle("past", Boolean(run));
+  for (const each of [trackLayer, goalLayer, ...marks.values()]) run ? each.remove() : each.addTo(map);
   isPast = Boolean(run);
-  if (!run) {
-    drawRovers();
-    return () => {};
-  }
+  if (!run) return drawRovers();
   const all = [];
   const shown = new Map();
   for (const rover of run.vehicles) {
-    const vehicle = state.vehicles.get(rover.vehicle) ?? null;
+    const vehicle = state.vehicles.get(rover.vehicle);
     const places = rover.points.map(([, north, east]) => point({ north, east }, vehicle) ?? [north, east]);
     if (places.length > 1) L.polyline(places, { color: taskColour(rover.vehicle), weight: 2, opacity: 0.6, interactive: false }).addTo(runLayer);
     if (places.length) shown.set(rover.vehicle, { mark: makeMark(rover.vehicle, places[0], runLayer), places });
@@ -292,9 +244,7 @@ export function showRun(run) {
   if (all.length) lookAt(L.latLngBounds(all).pad(0.3), { maxZoom: hasTiles ? 21 : 4 });
   return (vehicle, index, heading) => {
     const { mark, places } = shown.get(vehicle);
-    mark.setLatLng(places[Math.max(index, 0)]);
-    mark.getElement().classList.toggle("old", index < 0); // it comes to be there
-    mark._svg.style.transform = `rotate(${heading ?? 0}deg)`;
+    turnMark(mark, places[Math.max(index, 0)], heading, index < 0 && "old"); // it comes to be there
   };
 }
 
@@ -313,28 +263,28 @@ function clicked(latlng) {
   const heading = round(((Math.atan2(east, north) * 180) / Math.PI + 360) % 360, 1);
   const away = Math.hypot(north, east);
   const id = vehicle.vehicle;
-  const buttons = [];
-  const button = (words, act) => buttons.push(h("button", { class: "small", type: "button", onclick: () => { map.closePopup(); act(); } }, words));
-  if (may("submit")) {
-    button(`Go here (${away.toFixed(1)} m)…`, () => confirmGoal(id, target, `Send rover ${id} here, ${away.toFixed(1)} m away?`));
-    button(`Face here (${Math.round(heading)}°)…`, () => confirmGoal(id, { kind: "face", heading }, `Turn rover ${id} to ${Math.round(heading)}°?`));
-  }
-  if (may("fence") && "latitude" in place) button("Fence here…", () => fenceHere(id, place));
-  const ground = state.grounds.get(id);
-  if (may("fence") && ground && ground.shapes.length) button("Remove its fence…", () => removeFence(id));
-  if (!buttons.length) return;
-  const box = h("div", {}, h("p", {}, `Rover ${id}`), h("div", { class: "row" }, ...buttons));
+  const option = (isOffered, words, act) => isOffered && button(words, () => {
+    map.closePopup();
+    act();
+  });
+  const box = make(h("div", {}, h("p", {}, `Rover ${id}`), h("div", { class: "row" },
+    option(may("submit"), `Go here (${away.toFixed(1)} m)…`, () => confirmGoal(id, target, `Send rover ${id} here, ${away.toFixed(1)} m away?`)),
+    option(may("submit"), `Face here (${Math.round(heading)}°)…`, () => confirmGoal(id, { kind: "face", heading }, `Turn rover ${id} to ${Math.round(heading)}°?`)),
+    option(may("fence") && "latitude" in place, "Fence here…", () => fenceHere(id, place)),
+    option(may("fence") && state.grounds.get(id)?.fence.length, "Remove its fence…", () => removeFence(id)))));
+  const first = box.querySelector("button");
+  if (!first) return;
   L.popup({ closeButton: true, autoPan: true }).setLatLng(latlng).setContent(box).openOn(map);
-  buttons[0].focus({ preventScroll: true });
+  first.focus({ preventScroll: true });
 }
 
 function fenceHere(id, place) {
   ask({
     title: `Fence around this place for rover ${id}?`,
     words: ["The rover must stay inside the circle. This replaces its present fence. A task that would leave it is refused, and a driving rover stops at it."],
-    fields: h("div", { class: "fields" }, h("label", {}, "Radius (m)", h("input", { name: "radius", type: "number", min: 1, max: 10000, step: "any", value: FENCE_RADIUS }))),
+    fields: [h("div", { class: "fields" }, h("label", {}, "Radius (m)", h("input", { name: "radius", type: "number", min: 1, max: 10000, step: "any", value: FENCE_RADIUS })))],
     word: "Set the fence",
-    act: (form) => request("PUT", `/vehicles/${id}/fence`, { circle: { ...place, radius: Number(new FormData(form).get("radius")) } }).then(loadGround),
+    act: (form) => request("PUT", `/vehicles/${id}/fence`, { circle: { ...place, radius: form.elements.radius.valueAsNumber } }).then(loadGround),
   });
 }
 

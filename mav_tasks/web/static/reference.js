@@ -1,43 +1,44 @@
 // The page of the API: each operation of its OpenAPI document, with a form that sends it.
 
-import { h } from "./dom.js";
+import { draw, h, make } from "./dom.js";
 
-const place = document.getElementById("main");
 const found = await fetch("/api/v1/openapi.json");
-if (!found.ok) place.append(h("p", {}, h("a", { href: "/" }, "Log in"), " first, then load this page again."));
-const document_ = await (found.ok ? found.json() : { servers: [{}], info: {}, paths: {} });
-const root = document_.servers[0].url;
+const { info, servers, paths } = found.ok ? await found.json() : { servers: [{}], paths: {} };
+const root = servers[0].url;
+const code = (words) => h("code", {}, words);
 
-if (found.ok) place.append(h("p", {}, document_.info.description), h("p", {}, "Send does it: what a request moves is the real rover. From a program of yours, send the token as ", h("code", {}, "Authorization: Bearer TOKEN"), ". ", h("a", { href: `${root}/openapi.json` }, "The OpenAPI document")));
-for (const [path, methods] of Object.entries(document_.paths)) {
-  for (const [method, operation] of Object.entries(methods)) place.append(shown(method.toUpperCase(), path, operation));
-}
+draw(document.getElementById("main"), h("h1", {}, "The HTTP API"),
+  ...(found.ok ? [
+    h("p", {}, info.description),
+    h("p", {}, "Send does it: what a request moves is the real rover. From a program of yours, send the token as ", code("Authorization: Bearer TOKEN"), ". ", h("a", { href: `${root}/openapi.json` }, "The OpenAPI document")),
+  ] : [h("p", {}, h("a", { href: "/" }, "Log in"), " first, then load this page again.")]),
+  ...Object.entries(paths).flatMap(([path, methods]) => Object.entries(methods).map(([method, operation]) => about(method.toUpperCase(), path, operation))));
 
-function shown(method, path, { summary, description, parameters, requestBody, responses }) {
-  const fields = parameters.map((each) => ({ ...each, input: h("input", { required: each.required }) }));
+function about(method, path, { summary, description, parameters, requestBody, responses }) {
   const schema = requestBody?.content["application/json"].schema;
-  const body = schema && h("textarea", { rows: 4, cols: 70, spellcheck: false }, JSON.stringify(Object.fromEntries(schema.required.map((name) => [name, sample(schema.properties[name])]))));
-  const answer = h("pre", { "aria-live": "polite" });
+  const example = schema && Object.fromEntries(schema.required.map((name) => [name, sample(schema.properties[name])]));
   const isStream = "text/event-stream" in (responses[200]?.content ?? {});
-  const form = h("form", {},
-    description && h("p", {}, description),
-    ...fields.map(({ name, in: where, description: words, input }) => h("label", {}, `${name} (${where}) `, input, h("small", {}, words))),
-    body && h("label", {}, "Body, JSON ", body), schema && table(schema), !isStream && h("button", { class: "small main-word", type: "submit" }, "Send"), answer);
-  form.addEventListener("submit", async (event) => {
+  const answer = make(h("pre", { "aria-live": "polite" }));
+  const onsubmit = async (event) => {
     event.preventDefault();
-    answer.textContent = "sent…";
-    const of = (where) => fields.filter((each) => each.in === where && each.input.value).map((each) => [each.name, each.input.value]);
-    const filled = path.replace(/{(\w+)}/g, (_, name) => encodeURIComponent(Object.fromEntries(of("path"))[name]));
-    const query = new URLSearchParams(of("query")).toString();
+    draw(answer, "sent…");
+    const { elements } = event.target;
+    const of = (where) => parameters.filter((each) => each.in === where && elements[each.name].value).map(({ name }) => [name, elements[name].value]);
+    const filled = path.replace(/{(\w+)}/g, (_, name) => encodeURIComponent(elements[name].value));
+    const headers = { ...Object.fromEntries(of("header")), ...(schema && { "content-type": "application/json" }) };
     try {
-      const got = await fetch(`${root}${filled}${query && `?${query}`}`, { method, body: body?.value, headers: { ...Object.fromEntries(of("header")), ...(body && { "content-type": "application/json" }) } });
+      const got = await fetch(`${root}${filled}?${new URLSearchParams(of("query"))}`, { method, body: elements.body?.value, headers });
       const text = await got.text();
-      answer.textContent = `${got.status} ${text && JSON.stringify(JSON.parse(text), null, 2)}`;
+      draw(answer, `${got.status} ${text && JSON.stringify(JSON.parse(text), null, 2)}`);
     } catch (error) {
-      answer.textContent = String(error);
+      draw(answer, String(error));
     }
-  });
-  return h("details", {}, h("summary", {}, h("code", {}, `${method} ${path}`), ` ${summary}`), form);
+  };
+  return h("details", {}, h("summary", {}, code(`${method} ${path}`), ` ${summary}`), h("form", { onsubmit },
+    description && h("p", {}, description),
+    ...parameters.map(({ name, in: where, description: words, required }) => h("label", {}, `${name} (${where}) `, h("input", { name, required }), h("small", {}, words))),
+    schema && h("label", {}, "Body, JSON ", h("textarea", { name: "body", rows: 4, cols: 70, spellcheck: "false" }, JSON.stringify(example))),
+    schema && table(schema), !isStream && h("button", { class: "small main-word", type: "submit" }, "Send"), answer));
 }
 
 function sample({ type, items, anyOf, oneOf, properties, required = [], minimum = 0, enum: choices, const: only }) {

@@ -1,13 +1,10 @@
 // STOP: always in reach, at once, without a question, also while the event stream is down.
 
 import { Problem, post } from "./api.js";
-import { h, reconcile, say, show } from "./dom.js";
+import { button, draw, h } from "./dom.js";
 import { now, onChange, state, takeStop } from "./store.js";
-import { quick } from "./words.js";
+import { joined, quick } from "./words.js";
 
-const all = document.getElementById("stop-all");
-const one = document.getElementById("stop-one");
-const outcome = document.getElementById("stop-outcome");
 const SHOWN = 30; // s
 const FRESH = 3; // s until the queues show a STOP
 
@@ -22,10 +19,11 @@ const LINES = 2; // outcomes shown at once
 
 /** What was pressed and is not acknowledged yet, in words; by rover, null: all. @type {Map<number|null, {words: string, isFailure: boolean}>} */
 const tries = new Map();
+let pressed = null; // the button below a finger
 
 export function begin() {
-  press(all, () => null);
-  press(one, () => state.chosen);
+  Object.assign(document.getElementById("stop-all"), pressing(() => null));
+  Object.assign(document.getElementById("stop-one"), pressing(() => state.chosen));
   document.addEventListener("keydown", (event) => {
     const isTyping = event.target instanceof HTMLElement && event.target.matches(WITH_LETTERS);
     // with Caps Lock, Shift makes it small
@@ -34,35 +32,30 @@ export function begin() {
       if (!event.repeat) stop(null);
     }
   });
-  onChange(["chosen", "vehicles"], drawOne);
-  onChange(["stops", "clock", "queues", "vehicles"], draw);
+  onChange(["stops", "clock", "queues", "vehicles", "chosen"], drawAll);
 }
 
 /** A button that stops a rover, for its card. */
-export function stopButton(vehicle) {
-  const button = h("button", { class: "small stop-small", type: "button", "aria-label": `STOP rover ${vehicle}` }, "STOP");
-  press(button, () => vehicle);
-  return button;
-}
+export const stopButton = (vehicle) => button("STOP", undefined, { class: "small stop-small", "aria-label": `STOP rover ${vehicle}`, ...pressing(() => vehicle) });
 
 /** Stop a rover, null: all. */
 export async function stop(vehicle) {
   const mine = { words: `${nameOf(vehicle)}: sent…`, isFailure: false };
   tries.set(vehicle, mine); // a second press takes over from the first
-  draw();
+  drawAll();
   for (let count = 1; tries.get(vehicle) === mine; count += 1) {
     try {
       const done = await post("/stop", { vehicle }, { within: 6000 });
       if (tries.get(vehicle) === mine) tries.delete(vehicle);
       takeStop(done); // the event stream may be down
-      return draw();
+      return drawAll();
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
       const isFinal = FINAL.has(error.status);
       const next = isFinal ? "" : "Trying again. Use the rover's own switch.";
       mine.words = `${nameOf(vehicle)} not acknowledged: ${error.message.replace(/^STOP: /, "").replace(/\.$/, "")}. ${next}`;
       mine.isFailure = true;
-      draw();
+      drawAll();
       if (isFinal) return;
       await new Promise((resolve) => setTimeout(resolve, count < SOON ? AGAIN : LATER));
     }
@@ -72,45 +65,40 @@ export async function stop(vehicle) {
 const nameOf = (vehicle) => (vehicle === null ? "STOP" : `STOP ${vehicle}`);
 
 // on pressing, not on letting go; a click without a press comes from a keyboard or a screen reader
-function press(button, whom) {
-  let isPressed = false;
-  button.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
-    isPressed = true;
-    stop(whom());
-  });
-  button.addEventListener("click", () => {
-    if (!isPressed) stop(whom());
-    isPressed = false;
-  });
-  for (const end of ["pointercancel", "pointerleave"]) button.addEventListener(end, () => (isPressed = false));
+function pressing(whom) {
+  const lift = () => (pressed = null);
+  return {
+    onpointerdown: (event) => {
+      if (event.button !== 0) return;
+      pressed = event.currentTarget;
+      stop(whom());
+    },
+    onclick: (event) => {
+      if (pressed !== event.currentTarget) stop(whom());
+      pressed = null;
+    },
+    onpointercancel: lift,
+    onpointerleave: lift,
+  };
 }
 
-function drawOne() {
-  const isShown = state.chosen !== null && state.vehicles.size > 1;
-  show(one, isShown);
-  if (isShown) say(one, `STOP ${state.chosen}`);
-}
-
-function draw() {
+function drawAll() {
+  const one = document.getElementById("stop-one");
+  one.hidden = state.chosen === null || state.vehicles.size < 2;
+  draw(one, `STOP ${state.chosen}`);
   for (const [vehicle, each] of tries) if (each.isFailure && wasStoppedSince(vehicle, each)) tries.delete(vehicle);
-  const lines = [...tries].map(([vehicle, each]) => ({ key: `of ${vehicle}`, words: each.words, isFailure: each.isFailure }));
+  const lines = [...tries].map(([vehicle, each]) => ({ key: `of ${vehicle}`, ...each }));
   // what this page tries is told above, until it is acknowledged
   const recent = state.stops.filter((each) => now() - each.takenAt < SHOWN && holds(each) && (each.acknowledged_after !== null || !tries.has(each.vehicle)));
-  for (const each of recent.slice(-LINES)) lines.push({ key: each.number, words: outcomeWords(each), isFailure: ["refused", "unanswered"].includes(each.phase) });
-  reconcile(outcome, lines.slice(-LINES - 1), (line) => line.key, () => {
-    const element = h("span", {});
-    const update = (line) => {
-      say(element, line.words);
-      element.className = line.isFailure ? "bad" : "";
-    };
-    return { element, update };
-  });
+  for (const each of recent.slice(-LINES)) lines.push({ key: each.number, words: outcomeWords(each), isFailure: isLost(each) });
+  draw(document.getElementById("stop-outcome"), lines.slice(-LINES - 1).map(({ key, words, isFailure }) => h("span", { key, class: isFailure && "bad" }, words)));
 }
+
+const isLost = ({ phase }) => ["refused", "unanswered"].includes(phase);
 
 // a result is told as long as it is true: not after a resume, nor is a rover known to stand that is lost
 function holds(stop) {
-  if (["refused", "unanswered"].includes(stop.phase) || now() - stop.takenAt < FRESH) return true;
+  if (isLost(stop) || now() - stop.takenAt < FRESH) return true;
   return [...state.vehicles.values()].some((each) => [null, each.vehicle].includes(stop.vehicle) && (each.heard || stop.standing_after === null)
     && state.queues.get(each.vehicle)?.paused === "stopped");
 }
@@ -122,15 +110,14 @@ function wasStoppedSince(vehicle, tried) {
 }
 
 /** "STOP: acknowledged 34 ms · standing 0.8 s" */
-export function outcomeWords(stop) {
+function outcomeWords(stop) {
+  const { acknowledged_after: acknowledged, standing_after: standing, detail, tasks } = stop;
   const isMine = !state.session || stop.by === state.session.name;
   const who = `${nameOf(stop.vehicle)}${isMine ? "" : ` by ${stop.by}`}`;
-  if (stop.phase === "refused" || stop.phase === "unanswered") return `${who} ${stop.phase}: ${stop.detail}`;
-  const parts = [];
-  if (stop.acknowledged_after === null) parts.push("sent…");
-  else parts.push(`acknowledged ${quick(stop.acknowledged_after)}`);
-  if (stop.standing_after !== null) parts.push(`standing ${stop.standing_after.toFixed(1)} s`);
-  else if (stop.detail) parts.push(stop.detail);
-  if (stop.tasks.length) parts.push(`ended task${stop.tasks.length > 1 ? "s" : ""} ${stop.tasks.join(", ")}`);
-  return `${who}: ${parts.join(" · ")}`;
+  if (isLost(stop)) return `${who} ${stop.phase}: ${detail}`;
+  return `${who}: ${joined(
+    acknowledged === null ? "sent…" : `acknowledged ${quick(acknowledged)}`,
+    standing === null ? detail : `standing ${standing.toFixed(1)} s`,
+    tasks.length > 0 && `ended task${tasks.length > 1 ? "s" : ""} ${tasks.join(", ")}`,
+  )}`;
 }

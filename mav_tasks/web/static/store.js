@@ -4,23 +4,23 @@ export const state = {
   session: null,
   /** @type {Map<number, any>} */ vehicles: new Map(),
   /** @type {Map<number, any>} */ queues: new Map(),
-  /** @type {Map<number, any>} */ tasks: new Map(),
   /** @type {Map<number, any>} */ tracks: new Map(),
   /** @type {Map<number, any>} */ grounds: new Map(), // fence, rally points and mission by rover
   texts: [],
   areTextsWhole: false, // the web process has no older ones
   stops: [],
   chosen: null,
-  task: null, // the task of a permalink
-  stream: { isOpen: false, isLost: false, heardAt: 0 },
+  tab: "tab-queue",
+  task: null, // the id of the task of a permalink
+  one: null, // that task, once it is known
+  stream: "connecting", // open, lost
+  heardAt: 0,
   server: { reachable: true, detail: null },
 };
 
 const MOST_TEXTS = 2000;
-const MOST_TASKS = 10000;
 const listeners = [];
 let changed = new Set();
-let isAsked = false;
 
 /** Call a view before the next frame is drawn if one of these has changed. */
 export function onChange(names, view) {
@@ -29,16 +29,15 @@ export function onChange(names, view) {
 
 /** Note that parts of the state have changed. */
 export function change(...names) {
+  if (!changed.size) {
+    // a page in the background gets no frames, and must be right when it is looked at again
+    if (document.hidden) setTimeout(tell, 200);
+    else requestAnimationFrame(tell);
+  }
   for (const name of names) changed.add(name);
-  if (isAsked) return;
-  isAsked = true;
-  // a page in the background gets no frames, and must be right when it is looked at again
-  if (document.hidden) setTimeout(tell, 200);
-  else requestAnimationFrame(tell);
 }
 
 function tell() {
-  isAsked = false;
   const names = changed;
   changed = new Set();
   for (const each of listeners) if (each.names.some((name) => names.has(name))) each.view();
@@ -59,9 +58,8 @@ export const serverNow = () => Date.now() / 1000 + clockAhead;
 
 /** Take the states of rovers. */
 export function takeVehicles(vehicles) {
-  const at = now();
   for (const vehicle of vehicles) {
-    vehicle.takenAt = at;
+    vehicle.takenAt = now();
     state.vehicles.set(vehicle.vehicle, vehicle);
     addToTrack(vehicle);
   }
@@ -71,41 +69,40 @@ export function takeVehicles(vehicles) {
 
 /** Take a queue; it has its tasks in it. */
 export function takeQueue(queue) {
-  queue.takenAt = now();
   state.queues.set(queue.vehicle, queue);
-  for (const task of [queue.current, ...queue.waiting]) {
-    if (task && !(state.tasks.get(task.id)?.version > task.version)) state.tasks.set(task.id, task);
-  }
+  [queue.current, ...queue.waiting].forEach(takeOne);
   change("queues");
 }
 
 /** Take what has changed in a queue: the order of all of it, and the rows that are new or other. */
 export function takeQueueChange({ order, rows, ...head }) {
-  const before = state.queues.get(head.vehicle);
-  const known = new Map([...(before ? before.waiting : []), ...rows].map((row) => [row.id, row]));
+  const before = state.queues.get(head.vehicle)?.waiting ?? [];
+  const known = new Map([...before, ...rows].map((row) => [row.id, row]));
   const waiting = order.filter(([id]) => known.has(id)).map(([id, position, begin, end]) => (
     { ...known.get(id), position, time_to_start: begin, time_to_finish: end, halt_epoch: head.halt_epoch }
   ));
   takeQueue({ ...head, waiting });
 }
 
-/** Take a task; in the queue it replaces the line that it had. */
+/** Take a task; in the queue it replaces the one that runs. */
 export function takeTask(task) {
-  const before = state.tasks.get(task.id);
-  if (before && before.version > task.version) return;
-  state.tasks.delete(task.id); // the latest ones stay
-  state.tasks.set(task.id, task);
-  if (state.tasks.size > MOST_TASKS) state.tasks.delete(state.tasks.keys().next().value);
+  takeOne(task);
   const queue = state.queues.get(task.vehicle);
-  if (queue && queue.current && queue.current.id === task.id) {
+  if (queue?.current?.id === task.id && queue.current.version <= task.version) {
     state.queues.set(task.vehicle, { ...queue, current: task });
   }
   change("queues", "tasks");
 }
 
+// the task that is shown, unless what is known of it is newer
+function takeOne(task) {
+  if (task?.id !== state.task || (state.one?.id === task.id && state.one.version > task.version)) return;
+  state.one = task;
+  change("one");
+}
+
 export function takeTexts(texts) {
-  state.texts.push(...texts);
-  if (state.texts.length > MOST_TEXTS) state.texts.splice(0, state.texts.length - MOST_TEXTS);
+  state.texts = [...state.texts, ...texts].slice(-MOST_TEXTS);
   change("texts");
 }
 
@@ -120,24 +117,22 @@ export function takeOlderTexts(texts, areAll) {
 export function takeStop(stop, age = 0) {
   const place = state.stops.findIndex((each) => each.number === stop.number);
   const before = state.stops[place];
-  stop.takenAt = before ? before.takenAt : now() - age;
   // the answer of the request may come after a later event
-  const isOlder = before && ((before.acknowledged_after !== null && stop.acknowledged_after === null) || (before.standing_after !== null && stop.standing_after === null));
-  if (isOlder) return;
-  if (before) state.stops[place] = stop;
-  else state.stops.push(stop);
-  if (state.stops.length > 50) state.stops.shift();
+  for (const name of ["acknowledged_after", "standing_after"]) if (before && before[name] !== null && stop[name] === null) return;
+  stop.takenAt = before ? before.takenAt : now() - age;
+  state.stops.splice(before ? place : state.stops.length, 1, stop);
+  state.stops = state.stops.slice(-50);
   change("stops");
 }
 
-/** Choose a rover; null: none. */
+/** Choose a rover. */
 export function choose(vehicle) {
   state.chosen = vehicle;
   change("chosen", "queues", "vehicles");
 }
 
 /** The queue of the chosen rover. */
-export const chosenQueue = () => (state.chosen === null ? null : state.queues.get(state.chosen) ?? null);
+export const chosenQueue = () => state.queues.get(state.chosen);
 
 const agedBy = (age, vehicle) => (age === null ? null : age + (now() - vehicle.takenAt));
 
@@ -147,16 +142,25 @@ export const dataAge = (vehicle) => agedBy(vehicle.data_age, vehicle);
 /** How long ago its heartbeat was, s; null: not known. */
 export const linkAge = (vehicle) => agedBy(vehicle.heartbeat_age, vehicle);
 
+/** What a person has chosen of the view: of this browser, or until the page is closed if it keeps nothing. */
+export const kept = (() => {
+  try {
+    return localStorage;
+  } catch {
+    return {};
+  }
+})();
+
 const APART = 0.1; // m between two points of a track
 const MOST_POINTS = 20000;
 
 function addToTrack(vehicle) {
   if (vehicle.north === null) return;
-  let track = state.tracks.get(vehicle.vehicle);
-  if (!track) state.tracks.set(vehicle.vehicle, (track = { points: [], isWhole: false, revision: 0 }));
-  const queue = state.queues.get(vehicle.vehicle);
-  const task = queue && queue.current && queue.current.state === "executing" ? queue.current.id : null;
-  const last = track.points[track.points.length - 1];
+  const track = state.tracks.get(vehicle.vehicle) ?? { points: [], isWhole: false, revision: 0 };
+  state.tracks.set(vehicle.vehicle, track);
+  const current = state.queues.get(vehicle.vehicle)?.current;
+  const task = current?.state === "executing" ? current.id : null;
+  const last = track.points.at(-1);
   if (last && Math.hypot(last[1] - vehicle.north, last[2] - vehicle.east) < APART && last[4] === task) return;
   track.points.push([serverNow(), vehicle.north, vehicle.east, vehicle.heading, task]);
   if (track.points.length <= MOST_POINTS) return;

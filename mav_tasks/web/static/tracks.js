@@ -2,9 +2,7 @@
 // wanted: then each has a share of the points and goals that one page draws, so that the cost has a bound.
 
 import { get } from "./api.js";
-import { show } from "./dom.js";
-import { keep, kept } from "./kept.js";
-import { change, serverNow, state } from "./store.js";
+import { change, kept, serverNow, state } from "./store.js";
 import { taskColour } from "./words.js";
 
 /* global L: Leaflet, loaded before this module */
@@ -30,11 +28,11 @@ const long = new Map(); // goals of tasks that have many, by task
 /** Draw into two layers of the map. "on": its "point", "here" and "placed". */
 export function begin(layerOfTracks, layerOfGoals, on) {
   [trackLayer, goalLayer, place] = [layerOfTracks, layerOfGoals, on];
-  all.checked = kept("all tracks", "") === "yes";
-  all.addEventListener("change", () => {
-    keep("all tracks", all.checked ? "yes" : "");
+  all.checked = kept["mav-tasks all tracks"] === "yes";
+  all.onchange = () => {
+    kept["mav-tasks all tracks"] = all.checked ? "yes" : "";
     change("vehicles", "queues");
-  });
+  };
 }
 
 const areMany = () => state.vehicles.size > MANY;
@@ -43,7 +41,7 @@ const shareOf = (most) => Math.ceil(most / (areMany() && all.checked ? state.veh
 
 /** Draw what is new of the tracks. */
 export function drawTracks() {
-  show(choice, areMany());
+  choice.hidden = !areMany();
   const most = shareOf(MOST_POINTS);
   for (const [id, track] of state.tracks) {
     const vehicle = state.vehicles.get(id);

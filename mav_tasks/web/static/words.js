@@ -2,18 +2,17 @@
 
 /** "3 s", "2 min", "1 h 5 min" */
 export function duration(seconds) {
-  if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "unknown";
   const whole = Math.max(0, Math.round(seconds));
   if (whole < 60) return `${whole} s`;
   if (whole < 3600) return `${Math.floor(whole / 60)} min${whole % 60 && whole < 600 ? ` ${whole % 60} s` : ""}`;
-  const [unit, rest, [large, small]] = whole < 86400 ? [3600, 60, ["h", "min"]] : [86400, 3600, ["d", "h"]];
+  const [unit, rest, large, small] = whole < 86400 ? [3600, 60, "h", "min"] : [86400, 3600, "d", "h"];
   const left = Math.floor((whole % unit) / rest);
   return `${Math.floor(whole / unit)} ${large}${left ? ` ${left} ${small}` : ""}`;
 }
 
-/** Milliseconds below a second, else seconds with a decimal. */
+/** Milliseconds below a second, else seconds with a decimal; "": not known. */
 export function quick(seconds) {
-  if (seconds === null || seconds === undefined) return "";
+  if (seconds === null) return "";
   return seconds < 1 ? `${Math.round(seconds * 1000)}\u00a0ms` : `${seconds.toFixed(1)}\u00a0s`;
 }
 
@@ -24,35 +23,34 @@ export function clock(seconds) {
   return at.toDateString() === new Date().toDateString() ? time : `${at.toLocaleDateString([], { day: "numeric", month: "short" })} ${time}`;
 }
 
-/** A mark beside the word of a state, so that colour is not needed to tell them apart. */
-export const MARKS = {
+/** "1 task", "2 tasks" */
+export const counted = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;
+
+/** Those of the parts that there are. */
+export const joined = (...parts) => parts.filter(Boolean).join(" · ");
+
+// beside the word of a state, so that colour is not needed to tell them apart
+const MARKS = {
   scheduled: "◷", blocked: "◇", queued: "○", starting: "◔", executing: "▶", paused: "❚❚", cancelling: "◌", held: "⚠",
   completed: "✓", failed: "✗", cancelled: "–", killed: "■", expired: "⌛", unknown: "?",
 };
+export const WAITING = ["scheduled", "blocked", "queued"];
+export const ACTIVE = ["starting", "executing", "paused", "cancelling", "held"];
+export const OVER = ["completed", "failed", "cancelled", "killed", "expired"];
 
 /** "▶ executing" */
-export function stateWords(task) {
-  return `${MARKS[task.state] ?? ""} ${task.state}`;
-}
+export const stateWords = ({ state }) => `${MARKS[state] ?? ""} ${state}`;
 
 /** How far a task is: "1.2 m left, 40 %, ends in 3 s". */
-export function progressWords(task) {
-  const parts = [];
-  if (task.left !== null && task.left_unit) parts.push(`${task.left.toFixed(task.left_unit === "items" ? 0 : 1)} ${task.left_unit} left`);
-  if (task.progress !== null) parts.push(`${Math.round(task.progress * 100)} %`);
-  if (task.items > 1) parts.push(`item ${task.item} of ${task.items}`);
-  if (task.time_to_finish !== null) parts.push(`ends in ${duration(task.time_to_finish)}`);
-  return parts.join(" · ");
-}
+export const progressWords = (task) => joined(
+  task.left !== null && `${task.left.toFixed(task.left_unit === "items" ? 0 : 1)} ${task.left_unit} left`,
+  task.progress !== null && `${Math.round(task.progress * 100)} %`,
+  task.items > 1 && `item ${task.item} of ${task.items}`,
+  task.time_to_finish !== null && `ends in ${duration(task.time_to_finish)}`,
+);
 
 /** The name of a task: "Task 12 “to the gate”: move 2 m". */
-export function taskName(task) {
-  return `Task ${task.id}${task.label ? ` “${task.label}”` : ""}: ${task.what}`;
-}
-
-export const ACTIVE = new Set(["starting", "executing", "paused", "cancelling", "held"]);
-export const WAITING = new Set(["scheduled", "blocked", "queued"]);
-export const OVER = new Set(["completed", "failed", "cancelled", "killed", "expired"]);
+export const taskName = (task) => `Task ${task.id}${task.label ? ` “${task.label}”` : ""}: ${task.what}`;
 
 /** One of a fixed set of colours for each task. */
 export function taskColour(task) {
