@@ -80,7 +80,7 @@ function choice(ways, first) {
   const consequence = make(h("p", { "aria-live": "polite" }, ways[first]));
   const onchange = (event) => draw(consequence, ways[event.target.value]);
   const options = Object.keys(ways).map((each) => h("option", { value: each }, each));
-  return h("div", {}, h("label", { class: "whole" }, "How: ", h("select", { name: "how", onchange, value: first }, options)), consequence);
+  return h("div", {}, h("label", {}, "How: ", h("select", { name: "how", onchange, value: first }, options)), consequence);
 }
 
 /** Submit a goal, and say before what will happen. */

@@ -1,6 +1,6 @@
 // Begins everything: the rovers and STOP at once, the rest once it is known who I am; tabs and views.
 
-import { start } from "./connection.js";
+import { connect } from "./connection.js";
 import * as map from "./map.js";
 import * as past from "./past.js";
 import * as queue from "./queue.js";
@@ -16,7 +16,7 @@ stop.begin();
 rovers.begin();
 tabs();
 views();
-start(async () => {
+connect(async () => {
   await leaflet();
   for (const part of [map, queue, past, records, texts, timeline, routes]) part.begin();
 });

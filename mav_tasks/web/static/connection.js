@@ -15,27 +15,33 @@ let source = null;
 let triedAt = 0; // when the stream was opened
 let isSessionOld = false; // the stream was lost
 let first = null; // session of the process that this page came from
+let begin = null;
 
-/** Read the session, and open the stream; "begin" is called in between, the first time. */
-export async function start(begin) {
+/** Read the session, and open the stream; in between, the first time, begin what needs a session. */
+export function connect(beginning) {
+  begin = beginning;
+  start();
+}
+
+async function start() {
   try {
     await readSession();
   } catch (problem) {
-    if (problem.status === 401) return logIn(begin);
+    if (problem.status === 401) return logIn();
     if (!state.session) draw(link, h("span", { class: "bad" }, failureWords(problem)));
-    setTimeout(start, AGAIN, begin);
+    setTimeout(start, AGAIN);
     return;
   }
   if (!source) {
     await begin();
     onChange(["server", "clock", "session", "whole"], drawLink);
-    setInterval(watch, 1000, begin);
+    setInterval(watch, 1000);
   }
   change("session", "whole", "vehicles", "queues", "chosen", "texts");
-  open(begin);
+  open();
 }
 
-function logIn(begin) {
+function logIn() {
   ask({
     title: "Log in", word: "Log in", isNeeded: true,
     words: ["This page needs a token. An administrator makes one with: mav-tasks keys add NAME --role operator"],
@@ -45,7 +51,7 @@ function logIn(begin) {
     ],
     act: async (form) => {
       await post("/session", { token: form.elements.token.value.trim() });
-      setTimeout(start, 0, begin);
+      setTimeout(start);
     },
   });
 }
@@ -59,7 +65,7 @@ async function readSession() {
   change("session");
 }
 
-function open(begin) {
+function open() {
   source?.close();
   triedAt = now();
   source = new EventSource("/api/v1/events");
@@ -72,7 +78,7 @@ function open(begin) {
   source.onopen = heard;
   source.onerror = () => {
     lose();
-    if (source.readyState === EventSource.CLOSED) setTimeout(start, AGAIN, begin); // else it tries again by itself
+    if (source.readyState === EventSource.CLOSED) setTimeout(start, AGAIN); // else it tries again by itself
   };
 }
 
@@ -80,6 +86,7 @@ const TAKES = {
   snapshot: (all) => {
     for (const known of [state.vehicles, state.queues]) known.clear();
     Object.assign(state, { texts: [], areTextsWhole: false, stops: [], server: { reachable: all.reachable, detail: all.detail } });
+    if (state.one) state.one.version = 0; // another server may count from the beginning
     takeClock(all.now);
     for (const stop of all.stops) takeStop(stop, all.now - stop.at);
     takeVehicles(all.vehicles);
@@ -103,23 +110,27 @@ const TAKES = {
 };
 
 // does the stream still bring something? One that never answers is opened again, too
-function watch(begin) {
+function watch() {
   const isTrying = source.readyState !== EventSource.CLOSED; // else it waits for a token, or to try again
   if (isTrying && now() - Math.max(state.heardAt, triedAt) > SILENT) {
     lose();
-    open(begin);
+    open();
   }
-  if (state.stream === "open" && isSessionOld) {
-    isSessionOld = false; // it is asked once at a time
-    readSession().catch((problem) => (problem.status === 401 ? logIn(begin) : (isSessionOld = true)));
-  }
+  if (state.stream === "open") renewSession();
   change("clock");
+}
+
+function renewSession() {
+  if (!isSessionOld) return;
+  isSessionOld = false; // it is asked once at a time
+  readSession().catch((problem) => (problem.status === 401 ? logIn() : (isSessionOld = true)));
 }
 
 function heard() {
   state.heardAt = now();
   if (state.stream === "open") return;
   state.stream = "open";
+  renewSession();
   change("server");
 }
 

@@ -21,7 +21,7 @@ export function ask({ title, words = [], word, act, fields = [], isBeside = fals
   const go = make(h("button", { class: "small main-word", type: "submit" }, word));
   const form = make(h("form", { class: "box", role: "dialog", "aria-labelledby": "dialog-title", tabindex: -1 },
     h("h2", { id: "dialog-title" }, title),
-    h("div", {}, words.map((each) => h("p", { key: each }, each))),
+    h("div", {}, words.map((each) => h("p", {}, each))),
     ...fields,
     failure.element,
     h("div", { class: "row" }, !isNeeded && button("Back", close), go)));

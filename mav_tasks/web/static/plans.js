@@ -47,7 +47,7 @@ async function open(file) {
   const extra = (name, what, consequence) => plan[name].length > 0 && h("label", { class: "check" },
     h("input", { type: "checkbox", name, disabled: !may("fence"), checked: !plan.items && may("fence") }),
     `${plan.items ? "First set" : "Set"} ${what}. ${may("fence") ? consequence : "Your role may not."}`);
-  const terms = state.session.terms.filter(({ name }) => ["label", "priority"].includes(name));
+  const terms = ["label", "priority"].map((name) => state.session.terms.find((term) => term.name === name));
   const form = ask({
     title: plan.items ? `Queue this plan for rover ${vehicle}?` : `Set this for rover ${vehicle}?`, words, word: plan.items ? "Queue the plan" : "Set it", isBeside: true,
     fields: [

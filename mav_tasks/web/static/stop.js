@@ -39,7 +39,7 @@ export function begin() {
 export const stopButton = (vehicle) => button("STOP", undefined, { class: "small stop-small", "aria-label": `STOP rover ${vehicle}`, ...pressing(() => vehicle) });
 
 /** Stop a rover, null: all. */
-export async function stop(vehicle) {
+async function stop(vehicle) {
   const mine = { words: `${nameOf(vehicle)}: sent…`, isFailure: false };
   tries.set(vehicle, mine); // a second press takes over from the first
   drawAll();

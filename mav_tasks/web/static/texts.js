@@ -97,7 +97,7 @@ function drawAll() {
         type: "search", placeholder: "words or task number", "aria-label": "Show only lines with these words", oninput: (event) => filter("words", event.target.value),
       }))),
     h("ol", { class: "log", "aria-label": "Texts, the newest first", "aria-busy": String(isAsking) }, lines.map(row)),
-    h("p", { class: "empty" }, !lines.length && none),
+    !lines.length && h("p", { class: "empty" }, none),
     h("p", { class: "said", role: "status" }, said),
     failure.element,
     hasOlder && button("Older", showOlder));
