@@ -44,16 +44,13 @@ const ENDS = {
 const DEPENDS = "Tasks that run after it will fail.";
 
 export function cancel(task) {
-  const act = (body) => post(`/tasks/${task.id}/cancel`, body);
-  if (!ACTIVE.includes(task.state)) {
-    return ask({ title: `Cancel task ${task.id}?`, words: [taskName(task), "It will not run.", DEPENDS], word: "Cancel the task", act: () => act({}) });
-  }
-  // one that is being cancelled can only be ended sooner
-  const isCancelling = task.state === "cancelling";
+  const isActive = ACTIVE.includes(task.state);
+  const isCancelling = task.state === "cancelling"; // it can only be ended sooner
   const form = ask({
     title: isCancelling ? `End task ${task.id} at once?` : `Cancel task ${task.id}?`, word: isCancelling ? "Kill the task" : "Cancel the task",
-    words: [taskName(task)], fields: [choice(isCancelling ? { kill: ENDS.kill } : ENDS, isCancelling ? "kill" : "cancel"), h("p", {}, DEPENDS)],
-    act: () => act({ kill: form.elements.how.value === "kill" }),
+    words: [taskName(task), ...(isActive ? [] : ["It will not run."])],
+    fields: [isActive && choice(isCancelling ? { kill: ENDS.kill } : ENDS, isCancelling ? "kill" : "cancel"), h("p", {}, DEPENDS)],
+    act: () => post(`/tasks/${task.id}/cancel`, { kill: form.elements.how?.value === "kill" }),
   });
   form.onchange = () => draw(form.querySelector("[type=submit]"), form.elements.how.value === "kill" ? "Kill the task" : "Cancel the task");
 }

@@ -1,61 +1,49 @@
-// Begins everything: the rovers and STOP at once, the rest once it is known who I am; tabs and views.
+// Begins everything, STOP first: whatever fails after it, it works. The map and permalinks need to know who I am.
 
+import "./stop.js";
+import "./rovers.js";
+import "./queue.js";
+import "./past.js";
+import "./records.js";
+import "./texts.js";
+import "./timeline.js";
 import { connect } from "./connection.js";
+import { draw, h } from "./dom.js";
 import * as map from "./map.js";
-import * as past from "./past.js";
-import * as queue from "./queue.js";
-import * as records from "./records.js";
-import * as routes from "./routes.js";
-import * as rovers from "./rovers.js";
-import * as stop from "./stop.js";
-import { change, state } from "./store.js";
-import * as texts from "./texts.js";
-import * as timeline from "./timeline.js";
+import { change, onChange, showPath, showTask, state } from "./store.js";
 
-stop.begin();
-rovers.begin();
-tabs();
+const TABS = { queue: "Queue", past: "Past", records: "Recorded", texts: "Texts" };
+onChange(["session"], drawTabs);
+drawTabs();
 views();
 connect(async () => {
-  await leaflet();
-  for (const part of [map, queue, past, records, texts, timeline, routes]) part.begin();
+  await import("/static/leaflet/leaflet.js"); // not before the page shows rovers and STOP
+  map.begin();
+  addEventListener("popstate", showPath);
+  showPath();
 });
 
-// the page shows rovers and STOP before the map's library has come
-function leaflet() {
-  return new Promise((resolve, reject) => {
-    const script = document.createElement("script");
-    script.src = "/static/leaflet/leaflet.js";
-    script.onload = resolve;
-    script.onerror = () => reject(new Error("leaflet.js did not load"));
-    document.head.append(script);
-  });
+function drawTabs() {
+  const all = Object.keys(TABS).filter((name) => name !== "records" || state.session?.records);
+  if (!all.includes(state.tab)) return choose("queue");
+  const onkeydown = ({ key }) => {
+    const by = { ArrowRight: 1, ArrowLeft: -1 }[key];
+    if (!by) return;
+    choose(all.at((all.indexOf(state.tab) + by) % all.length));
+    document.getElementById(`tab-${state.tab}`).focus();
+  };
+  draw(document.getElementById("tabs"), all.map((name) => h("button", {
+    key: name, id: `tab-${name}`, type: "button", role: "tab", "aria-controls": `panel-${name}`, onclick: () => choose(name), onkeydown,
+    "aria-selected": String(name === state.tab), tabindex: name === state.tab ? 0 : -1,
+  }, TABS[name])));
+  for (const name of Object.keys(TABS)) document.getElementById(`panel-${name}`).hidden = name !== state.tab;
 }
 
-function tabs() {
-  const all = [...document.querySelectorAll("[role=tab]")];
-  const choose = (tab) => {
-    for (const each of all) {
-      const isChosen = each === tab;
-      each.ariaSelected = String(isChosen);
-      each.tabIndex = isChosen ? 0 : -1;
-      document.getElementById(each.getAttribute("aria-controls")).hidden = !isChosen;
-    }
-    routes.showTask(null);
-    state.tab = tab.id;
-    change("tab");
-  };
-  for (const tab of all) {
-    tab.onclick = () => choose(tab);
-    tab.onkeydown = ({ key }) => {
-      const step = { ArrowRight: 1, ArrowLeft: -1 }[key];
-      if (!step) return;
-      const there = all.filter((each) => !each.hidden);
-      const next = there.at((there.indexOf(tab) + step) % there.length);
-      choose(next);
-      next.focus();
-    };
-  }
+function choose(tab) {
+  showTask(null);
+  state.tab = tab;
+  change("tab");
+  drawTabs();
 }
 
 function views() {

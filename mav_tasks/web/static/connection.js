@@ -13,7 +13,6 @@ const AGAIN = 3000; // ms
 const link = document.getElementById("link");
 let source = null;
 let triedAt = 0; // when the stream was opened
-let isSessionOld = false; // the stream was lost
 let first = null; // session of the process that this page came from
 let begin = null;
 
@@ -59,7 +58,6 @@ function logIn() {
 async function readSession() {
   const session = await get("/session");
   first ??= session;
-  isSessionOld = false;
   if (JSON.stringify(session) === JSON.stringify(state.session)) return;
   state.session = session;
   change("session");
@@ -116,27 +114,22 @@ function watch() {
     lose();
     open();
   }
-  if (state.stream === "open") renewSession();
   change("clock");
 }
 
-function renewSession() {
-  if (!isSessionOld) return;
-  isSessionOld = false; // it is asked once at a time
-  readSession().catch((problem) => (problem.status === 401 ? logIn() : (isSessionOld = true)));
-}
+// another web process may answer now
+const renewSession = () => readSession().catch((problem) => (problem.status === 401 ? logIn() : setTimeout(renewSession, AGAIN)));
 
 function heard() {
   state.heardAt = now();
   if (state.stream === "open") return;
+  if (state.stream === "lost") renewSession();
   state.stream = "open";
-  renewSession();
   change("server");
 }
 
 // a page begins without an alarm: what is not open yet is not lost
 function lose() {
-  isSessionOld = true;
   if (state.stream === "lost") return;
   state.stream = "lost";
   change("server");

@@ -2,8 +2,6 @@
 // that a finger on the row still scrolls. Escape ends it, and so does the browser (pointercancel).
 
 const FEW = 5; // px before it is a drag
-const EDGE = 48; // px from the edge of the pane, where it scrolls
-const FAST = 10; // px a frame, at most
 
 /**
  * Let the rows of a list be dragged that are "movable" and have a "grip".
@@ -20,7 +18,6 @@ export function makeDraggable(list, over, drop) {
   });
 
   function follow(row, pressed) {
-    const pane = list.closest(".pane");
     const listeners = new AbortController();
     let isDragged = false;
     let target = null;
@@ -32,15 +29,8 @@ export function makeDraggable(list, over, drop) {
       const next = found === row ? null : found;
       if (next === target) return;
       target = next;
+      target?.scrollIntoView({ block: "nearest", behavior: "smooth" }); // at an edge of the pane it goes on from row to row
       over(row, target);
-    };
-    const scroll = () => {
-      if (listeners.signal.aborted) return;
-      const { top, bottom } = pane.getBoundingClientRect();
-      const by = Math.min(at.clientY - top - EDGE, 0) + Math.max(at.clientY - bottom + EDGE, 0);
-      pane.scrollTop += Math.max(-FAST, Math.min(FAST, by / 4));
-      if (by) look();
-      requestAnimationFrame(scroll);
     };
     const end = () => {
       listeners.abort();
@@ -60,7 +50,6 @@ export function makeDraggable(list, over, drop) {
         if (Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) < FEW) return;
         isDragged = true;
         over(row, null);
-        scroll();
       }
       look();
     });
@@ -69,6 +58,7 @@ export function makeDraggable(list, over, drop) {
       end();
     });
     on("pointercancel", end);
+    list.closest(".pane").addEventListener("scroll", look, { signal: listeners.signal });
     document.addEventListener("keydown", (event) => event.key === "Escape" && end(), { signal: listeners.signal });
   }
 }

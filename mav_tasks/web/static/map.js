@@ -104,11 +104,7 @@ const offset = (from, latitude, longitude) => [(latitude - from.latitude) * METR
 const placed = ({ origin }) => `${origin?.latitude} ${origin?.longitude} ${reference?.latitude} ${reference?.longitude}`;
 
 /** The place of a point of the map, for a goal: on earth, or in the rover's frame. */
-function placeAt(latlng, vehicle) {
-  if (hasTiles) return { latitude: latlng.lat, longitude: latlng.lng };
-  if (reference) return onEarth(reference, latlng.lat, latlng.lng);
-  return vehicle ? { north: latlng.lat, east: latlng.lng } : null;
-}
+const placeAt = ({ lat, lng }) => (hasTiles ? { latitude: lat, longitude: lng } : reference ? onEarth(reference, lat, lng) : { north: lat, east: lng });
 
 function here({ north, east, latitude, longitude, origin }) {
   if (north === null) return null;
@@ -209,13 +205,7 @@ function covered(element) {
 export function showTrack(track) {
   taskTrackLayer.clearLayers();
   if (!track) return;
-  const vehicle = state.vehicles.get(track.vehicle);
-  const lines = [[]];
-  for (const [at, each] of track.points.entries()) {
-    if (at && tracks.isGap(track.points[at - 1], each)) lines.push([]);
-    const shown = point({ north: each[1], east: each[2] }, vehicle);
-    if (shown) lines.at(-1).push(shown);
-  }
+  const lines = tracks.waysOf(track.points, state.vehicles.get(track.vehicle)).map(({ places }) => places);
   const places = lines.flat();
   if (places.length < 2) return;
   L.polyline(lines, { color: taskColour(track.id), weight: 7, opacity: 0.5, interactive: false }).addTo(taskTrackLayer);
@@ -251,10 +241,9 @@ export function showRun(run) {
 function clicked(latlng) {
   if (isPast) return;
   const vehicle = state.vehicles.get(state.chosen);
-  if (!vehicle) return;
-  const place = placeAt(latlng, vehicle);
-  const from = here(vehicle);
-  if (!place || !from) return;
+  const from = vehicle && here(vehicle);
+  if (!from) return;
+  const place = placeAt(latlng);
   const target = "latitude" in place
     ? { kind: "goto_global", latitude: round(place.latitude, 7), longitude: round(place.longitude, 7) }
     : { kind: "goto", north: round(place.north, 2), east: round(place.east, 2) };
@@ -305,26 +294,19 @@ const named = (metres, positive, negative) => (Math.abs(metres) < 0.05 ? "0" : `
 function grid() {
   const layer = L.gridLayer({ tileSize: 256, updateWhenIdle: false });
   layer.createTile = (coords) => {
-    const tile = document.createElement("canvas");
-    tile.width = tile.height = 256;
-    const pen = tile.getContext("2d");
-    const size = 256 / 2 ** coords.z; // m
-    const step = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((each) => each * 2 ** coords.z >= 48) ?? 5000;
-    const style = getComputedStyle(document.documentElement);
-    pen.strokeStyle = style.getPropertyValue("--line");
-    pen.fillStyle = style.getPropertyValue("--soft");
-    pen.font = "10px system-ui";
-    const west = coords.x * size;
-    const north = -coords.y * size;
+    const tile = make(h("canvas", { width: 256, height: 256 }));
+    const { color, borderTopColor } = getComputedStyle(document.querySelector(".map-foot"));
+    const pen = Object.assign(tile.getContext("2d"), { strokeStyle: borderTopColor, fillStyle: color, font: "10px system-ui" });
+    const scale = 2 ** coords.z; // px of a metre
+    const step = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((each) => each * scale >= 48) ?? 5000;
+    const [west, north] = [(coords.x * 256) / scale, (-coords.y * 256) / scale];
     // from one line before: its words reach into this tile
-    for (let east = (Math.ceil(west / step) - 1) * step; east < west + size; east += step) {
-      const x = Math.round((east - west) * 2 ** coords.z) + 0.5;
+    for (let n = -1; n * step * scale < 256 + step * scale; n += 1) {
+      const [east, at] = [(Math.ceil(west / step) + n) * step, (Math.floor(north / step) - n) * step];
+      const [x, y] = [Math.round((east - west) * scale) + 0.5, Math.round((north - at) * scale) + 0.5];
       pen.strokeRect(x, -1, 512, 512);
-      if (Math.round(north / step) % 2 === 0) pen.fillText(named(east, "E", "W"), x + 2, 10);
-    }
-    for (let at = Math.floor(north / step) * step; at > north - size - step; at -= step) {
-      const y = Math.round((north - at) * 2 ** coords.z) + 0.5;
       pen.strokeRect(-1, y, 512, 512);
+      if (Math.round(north / step) % 2 === 0) pen.fillText(named(east, "E", "W"), x + 2, 10);
       if (Math.round(west / step) % 2 === 0) pen.fillText(named(at, "N", "S"), 2, y - 2);
     }
     return tile;

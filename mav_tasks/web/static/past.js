@@ -4,10 +4,9 @@ import { failureWords, get } from "./api.js";
 import * as acts from "./acts.js";
 import { button, draw, failureLine, h } from "./dom.js";
 import { showTrack } from "./map.js";
-import { change, onChange, serverNow, state } from "./store.js";
-import { showTask, taskLink } from "./routes.js";
+import { change, onChange, serverNow, showTask, state } from "./store.js";
 import { openChangeForm } from "./task_form.js";
-import { ACTIVE, OVER, WAITING, clock, duration, joined, progressWords, quick, stateWords, taskName } from "./words.js";
+import { ACTIVE, OVER, WAITING, clock, duration, joined, progressWords, quick, stateWords, taskLink, taskName } from "./words.js";
 
 const detail = document.getElementById("panel-task");
 const LISTED = 100;
@@ -17,11 +16,9 @@ let wanted = LISTED;
 let loadedFor = "";
 let whole = { vehicle: 0, wanted: 0 }; // what "tasks" has
 
-export function begin() {
-  onChange(["route"], open);
-  onChange(["one", "session"], drawOne);
-  onChange(["chosen", "tasks", "queues", "whole"], refresh);
-}
+onChange(["route"], open);
+onChange(["one", "session"], drawOne);
+onChange(["chosen", "tasks", "queues", "whole"], refresh);
 
 /** Load more finished tasks than the list has at first. */
 export function loadMore(count) {

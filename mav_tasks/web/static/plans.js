@@ -5,7 +5,7 @@ import { consequenceOf, may } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { button, failureLine, h, make } from "./dom.js";
 import { loadGround, preview } from "./map.js";
-import { fieldsOf, filledIn } from "./parts.js";
+import { fieldsOf, filledIn } from "./task_form.js";
 import { state } from "./store.js";
 import { counted } from "./words.js";
 

@@ -6,9 +6,8 @@ import { makeDraggable } from "./dragging.js";
 import { button, draw, failureLine, h, make } from "./dom.js";
 import { openTaskForm } from "./task_form.js";
 import { planDrop } from "./plans.js";
-import { taskLink } from "./routes.js";
 import { chosenQueue, onChange, state } from "./store.js";
-import { duration, joined, progressWords, stateWords, taskName } from "./words.js";
+import { duration, joined, progressWords, stateWords, taskLink, taskName } from "./words.js";
 
 const panel = document.getElementById("panel-queue");
 const RUNS = { starting: "starts", executing: "runs", paused: "is paused", cancelling: "is being cancelled", held: "is held" };
@@ -22,14 +21,12 @@ let over = null;
 let said = "";
 let telling = 0;
 
-export function begin() {
-  onChange(["queues", "chosen", "tasks", "clock", "whole", "session"], drawAll);
-  makeDraggable(list, (row, target) => {
-    [dragged, over] = [row && idOf(row), target && idOf(target)];
-    if (over) tell(`Task ${dragged} will run ${isUp() ? "before" : "after"} task ${over}.`);
-    drawAll();
-  }, (row, target) => move(idOf(row), placeOf(idOf(target))));
-}
+onChange(["queues", "chosen", "tasks", "clock", "whole", "session"], drawAll);
+makeDraggable(list, (row, target) => {
+  [dragged, over] = [row && idOf(row), target && idOf(target)];
+  if (over) tell(`Task ${dragged} will run ${isUp() ? "before" : "after"} task ${over}.`);
+  drawAll();
+}, (row, target) => move(idOf(row), placeOf(idOf(target))));
 
 const idOf = (row) => Number(row.dataset.task);
 

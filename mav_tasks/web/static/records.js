@@ -3,7 +3,7 @@
 import { get } from "./api.js";
 import { button, draw, failureLine, h } from "./dom.js";
 import { showRun } from "./map.js";
-import { onChange, state } from "./store.js";
+import { onChange } from "./store.js";
 import { clock, duration, joined } from "./words.js";
 
 const panel = document.getElementById("panel-records");
@@ -21,17 +21,10 @@ let at = 0;
 let speed = 5;
 let timer = 0;
 
-export function begin() {
-  onChange(["session"], () => {
-    const tab = document.getElementById("tab-records");
-    tab.hidden = !state.session.records;
-    if (tab.hidden && state.tab === tab.id) document.getElementById("tab-queue").click();
-  });
-  onChange(["tab"], () => {
-    if (panel.hidden) return run && close();
-    if (!run) failure.trying(async () => ({ records } = await get("/records"))).then(drawAll);
-  });
-}
+onChange(["tab"], () => {
+  if (panel.hidden) return run && close();
+  if (!run) failure.trying(async () => ({ records } = await get("/records"))).then(drawAll);
+});
 
 async function open(chosen) {
   reading = name = chosen;
@@ -102,15 +95,7 @@ function roverWords({ vehicle, points, modes }) {
 }
 
 /** The place of the last row whose time, its first value or "at", is not after the moment; -1: there is none. */
-function lastBefore(rows) {
-  let [low, high] = [0, rows.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if ((rows[middle][0] ?? rows[middle].at) <= at) low = middle + 1;
-    else high = middle;
-  }
-  return low - 1;
-}
+const lastBefore = (rows) => rows.findLastIndex((row) => (row[0] ?? row.at) <= at);
 
 function toggle() {
   if (timer) return stop();

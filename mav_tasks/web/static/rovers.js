@@ -12,9 +12,7 @@ const LOW = 20; // percent
 const MANY = 6; // rovers; beyond that only the chosen one shows all its facts
 const failures = new Map();
 
-export function begin() {
-  onChange(["vehicles", "queues", "chosen", "clock", "server", "whole", "session"], drawAll);
-}
+onChange(["vehicles", "queues", "chosen", "clock", "server", "whole", "session"], drawAll);
 
 function drawAll() {
   const rovers = [...state.vehicles.values()].sort((a, b) => a.vehicle - b.vehicle);

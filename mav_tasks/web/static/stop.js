@@ -21,19 +21,17 @@ const LINES = 2; // outcomes shown at once
 const tries = new Map();
 let pressed = null; // the button below a finger
 
-export function begin() {
-  Object.assign(document.getElementById("stop-all"), pressing(() => null));
-  Object.assign(document.getElementById("stop-one"), pressing(() => state.chosen));
-  document.addEventListener("keydown", (event) => {
-    const isTyping = event.target instanceof HTMLElement && event.target.matches(WITH_LETTERS);
-    // with Caps Lock, Shift makes it small
-    if (event.key.toUpperCase() === "S" && event.shiftKey && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping) {
-      event.preventDefault();
-      if (!event.repeat) stop(null);
-    }
-  });
-  onChange(["stops", "clock", "queues", "vehicles", "chosen"], drawAll);
-}
+Object.assign(document.getElementById("stop-all"), pressing(() => null));
+Object.assign(document.getElementById("stop-one"), pressing(() => state.chosen));
+document.addEventListener("keydown", (event) => {
+  const isTyping = event.target instanceof HTMLElement && event.target.matches(WITH_LETTERS);
+  // with Caps Lock, Shift makes it small
+  if (event.key.toUpperCase() === "S" && event.shiftKey && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping) {
+    event.preventDefault();
+    if (!event.repeat) stop(null);
+  }
+});
+onChange(["stops", "clock", "queues", "vehicles", "chosen"], drawAll);
 
 /** A button that stops a rover, for its card. */
 export const stopButton = (vehicle) => button("STOP", undefined, { class: "small stop-small", "aria-label": `STOP rover ${vehicle}`, ...pressing(() => vehicle) });

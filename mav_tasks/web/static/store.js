@@ -10,7 +10,7 @@ export const state = {
   areTextsWhole: false, // the web process has no older ones
   stops: [],
   chosen: null,
-  tab: "tab-queue",
+  tab: "queue",
   task: null, // the id of the task of a permalink
   one: null, // that task, once it is known
   stream: "connecting", // open, lost
@@ -101,15 +101,11 @@ function takeOne(task) {
   change("one");
 }
 
-export function takeTexts(texts) {
-  state.texts = [...state.texts, ...texts].slice(-MOST_TEXTS);
-  change("texts");
-}
-
-/** Take texts that are older than all that are known; "areAll": there are no others. */
-export function takeOlderTexts(texts, areAll) {
-  state.texts.unshift(...texts);
-  state.areTextsWhole = areAll || state.texts.length >= MOST_TEXTS;
+/** Take texts; "isOldest": they are older than all that are known, and whether there are no others. */
+export function takeTexts(texts, isOldest) {
+  const isOlder = isOldest !== undefined;
+  state.texts = isOlder ? [...texts, ...state.texts] : [...state.texts, ...texts].slice(-MOST_TEXTS);
+  if (isOlder) state.areTextsWhole = isOldest || state.texts.length >= MOST_TEXTS;
   change("texts");
 }
 
@@ -124,6 +120,18 @@ export function takeStop(stop, age = 0) {
   state.stops = state.stops.slice(-50);
   change("stops");
 }
+
+/** Show a task, by its permalink; null: none. */
+export function showTask(id) {
+  const path = id === null ? "/" : `/tasks/${id}`;
+  if (location.pathname !== path) history.pushState(null, "", path);
+  if (state.task === id) return;
+  Object.assign(state, { task: id, one: null });
+  change("route");
+}
+
+/** Show what the address of the page says: /tasks/12 is a task. */
+export const showPath = () => showTask(Number(location.pathname.match(/^\/tasks\/(\d+)$/)?.[1]) || null);
 
 /** Choose a rover. */
 export function choose(vehicle) {

@@ -2,9 +2,8 @@
 
 import { get } from "./api.js";
 import { button, draw, failureLine, h } from "./dom.js";
-import { onChange, state, takeOlderTexts } from "./store.js";
-import { taskLink } from "./routes.js";
-import { clock, counted } from "./words.js";
+import { onChange, state, takeTexts } from "./store.js";
+import { clock, counted, taskLink } from "./words.js";
 
 const panel = document.getElementById("panel-texts");
 const SHOWN = 300; // lines at first
@@ -24,9 +23,7 @@ let most = SHOWN;
 let isAsking = false;
 let said = "";
 
-export function begin() {
-  onChange(["texts", "chosen", "whole", "session", "tab"], drawAll);
-}
+onChange(["texts", "chosen", "whole", "session", "tab"], drawAll);
 
 const isJournal = () => filters.From === "journal";
 
@@ -68,7 +65,7 @@ async function showOlder() {
       const first = state.texts[0];
       const { texts } = await get(`/texts?before=${first.number}&limit=${MORE}`);
       if (state.texts[0] !== first) break; // the web process was started again meanwhile
-      takeOlderTexts(texts, texts.length < MORE);
+      takeTexts(texts, texts.length < MORE);
       found = matching().length;
     }
     const added = Math.min(found, most + MORE) - Math.min(before, most);
@@ -81,7 +78,7 @@ async function showOlder() {
 
 function drawAll() {
   if (panel.hidden) return;
-  const hasJournal = state.session.journal;
+  const hasJournal = state.session?.journal;
   if (!hasJournal) filters.From = "texts";
   const wanted = filters.Rover && state.chosen !== null ? `&vehicle=${state.chosen}` : "";
   if (isJournal() && journalOf !== wanted) loadJournal(wanted);
@@ -110,9 +107,4 @@ function row({ number, at, vehicle, severity, words }) {
 }
 
 // "Task 12 …" becomes a link to the task
-function linked(words) {
-  const found = words.match(/^(.*?)\b([Tt]ask )(\d{1,10})\b(.*)$/s);
-  if (!found) return [words];
-  const [, before, name, id, after] = found;
-  return [before, taskLink(Number(id), name + id), after];
-}
+const linked = (words) => words.split(/\b(task \d{1,10})\b/i).map((part, at) => (at % 2 ? taskLink(Number(part.slice(5)), part) : part));

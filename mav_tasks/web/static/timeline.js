@@ -3,8 +3,7 @@
 
 import { button, draw, h, make } from "./dom.js";
 import * as past from "./past.js";
-import { chosenQueue, kept, onChange, serverNow } from "./store.js";
-import { showTask } from "./routes.js";
+import { chosenQueue, kept, onChange, serverNow, showTask } from "./store.js";
 import { taskName } from "./words.js";
 
 const SPANS = { 600: "10 min", 3600: "1 h", 21600: "6 h", 86400: "24 h" }; // s
@@ -18,20 +17,11 @@ const WHEEL = 60; // px of a wheel or touch pad for one step
 const FEW = 4; // px that a pointer moves before it drags
 
 const place = document.getElementById("timeline");
-const bars = make(h("div"));
 const strip = make(h("div", { class: "strip", role: "group", tabindex: 0 }));
 
 let span = LENGTHS[0];
 let middle = null; // seconds since 1970; null: now
 let focused = 0; // the task whose bar the keyboard reaches
-
-export function begin() {
-  place.addEventListener("keydown", onKey);
-  strip.addEventListener("wheel", onWheel, { passive: false });
-  strip.addEventListener("pointerdown", onPointer);
-  take(Number(kept["mav-tasks time line"]));
-  onChange(["queues", "chosen", "clock", "whole", "past"], drawAll);
-}
 
 function take(seconds) {
   if (!LENGTHS.includes(seconds)) return;
@@ -60,7 +50,7 @@ function onKey(event) {
 
 // from bar to bar; from a button to the bar that the keyboard was on
 function step(by) {
-  const all = [...bars.children];
+  const all = [...strip.querySelectorAll(".bar")];
   const at = all.indexOf(document.activeElement);
   (at < 0 ? all.find((bar) => bar.tabIndex === 0) : all[at + by])?.focus();
 }
@@ -127,18 +117,18 @@ function drawAll() {
   // one stop of the Tab key; arrow keys go on from there
   const reached = (shown.find(({ task }) => task.id === focused) ?? shown.at(-1))?.task.id;
   const known = past.knownSince();
-  draw(bars, shown.map(({ task, from, to, kind }) => {
+  const bars = shown.map(({ task, from, to, kind }) => {
     const left = Math.max(0, x(from));
     const width = Math.min(100, x(to)) - left;
     const title = `${taskName(task)}: ${task.state}`;
     const own = { title, "aria-label": title, style: `left: ${left}%; width: ${Math.max(0.4, width)}%`, tabindex: task.id === reached ? 0 : -1 };
     const isRoom = (width * strip.clientWidth) / 100 > 8 * String(task.id).length + 8; // else it would lie on the next one's
     return h("button", { key: task.id, type: "button", class: `bar ${kind}`, onclick: () => showTask(task.id), onfocus: () => (focused = task.id), ...own }, isRoom && task.id);
-  }));
+  });
   strip.ariaLabel = `Tasks from ${timeOf(first)} to ${timeOf(last)}`;
   draw(strip,
     known > first && h("div", { class: "unknown", style: `width: ${Math.min(100, x(known))}%` }, "not loaded"),
-    bars,
+    h("div", {}, bars),
     h("div", { "aria-hidden": "true" }, ticksBetween(first, last, pixels).map((at) => h("span", { key: at, class: "tick", style: `left: ${x(at)}%` }, timeOf(at)))),
     present >= first && present <= last && h("div", { class: "now-line", style: `left: ${x(present)}%` }));
   const small = (words, label, act, isPressed) => button(words, act, { "aria-label": label, title: label, "aria-pressed": isPressed });
@@ -160,3 +150,9 @@ function ticksBetween(first, last, pixels) {
   const count = Math.floor((last - edge - begins) / tick) + 1;
   return Array.from({ length: Math.max(0, count) }, (_, n) => begins + n * tick);
 }
+
+place.addEventListener("keydown", onKey);
+strip.addEventListener("wheel", onWheel, { passive: false });
+strip.addEventListener("pointerdown", onPointer);
+take(Number(kept["mav-tasks time line"]));
+onChange(["queues", "chosen", "clock", "whole", "past"], drawAll);

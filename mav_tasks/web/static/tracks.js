@@ -17,9 +17,8 @@ const PIECE = 200; // points of a track in one line
 const choice = document.getElementById("map-choice");
 const all = choice.querySelector("input");
 
+let [trackLayer, goalLayer] = [];
 let place = null; // of the map: point(place, vehicle), here(vehicle), placed(vehicle)
-let trackLayer = null;
-let goalLayer = null;
 let isLoading = false;
 const tracks = new Map();
 const goals = new Map();
@@ -39,71 +38,67 @@ const areMany = () => state.vehicles.size > MANY;
 const isShown = (rover) => !areMany() || all.checked || rover === state.chosen;
 const shareOf = (most) => Math.ceil(most / (areMany() && all.checked ? state.vehicles.size : 1));
 
-/** Draw what is new of the tracks. */
-export function drawTracks() {
-  choice.hidden = !areMany();
-  const most = shareOf(MOST_POINTS);
-  for (const [id, track] of state.tracks) {
-    const vehicle = state.vehicles.get(id);
-    if (!vehicle || !isShown(id)) continue;
-    let drawn = tracks.get(id);
-    if (!drawn) tracks.set(id, (drawn = { shown: "", layer: L.layerGroup().addTo(trackLayer) }));
-    if (id === state.chosen && !track.isWhole) load(id, track, 0);
-    else if (!track.isWhole && !track.isLate && !isLoading) load(id, track, serverNow() - LATELY);
-    extend(drawn, track, vehicle, most);
-  }
-  removeOthers(tracks);
-}
-
-function removeOthers(drawn) {
+/** Draw what is new of each rover that is shown; what was drawn of others goes. */
+function drawEach(drawn, layer, draw) {
   for (const [id, each] of drawn) {
     if (isShown(id) && state.vehicles.has(id)) continue;
     each.layer.remove();
     drawn.delete(id);
   }
+  for (const [id, vehicle] of state.vehicles) {
+    if (!isShown(id)) continue;
+    if (!drawn.has(id)) drawn.set(id, { layer: L.layerGroup().addTo(layer) });
+    draw(id, vehicle, drawn.get(id));
+  }
+}
+
+export function drawTracks() {
+  choice.hidden = !areMany();
+  const most = shareOf(MOST_POINTS);
+  drawEach(tracks, trackLayer, (id, vehicle, drawn) => {
+    const track = state.tracks.get(id);
+    if (!track) return;
+    if (id === state.chosen && !track.isWhole) load(id, track, 0);
+    else if (!track.isWhole && !track.isLate && !isLoading) load(id, track, serverNow() - LATELY);
+    extend(drawn, track, vehicle, most);
+  });
 }
 
 /** Whether nobody saw the rover on its way between two points: it was silent, or began to count anew. */
 export const isGap = ([at, north, east], [later, ...to]) => Math.hypot(to[0] - north, to[1] - east) > (later - at > 2 ? 1 : 20);
 
-// Only what is new is drawn: a track has thousands of points and grows ten times a second. Short pieces, because
-// Leaflet projects all points of a line again when one is added; the oldest piece goes once there are too many points.
-function extend(drawn, track, vehicle, most) {
-  const { points } = track;
-  const shown = `${track.revision} ${most} ${place.placed(vehicle)}`;
-  if (drawn.shown !== shown) {
-    Object.assign(drawn, { shown, count: Math.max(0, points.length - most), pieces: [], total: 0, last: null });
-    drawn.layer.clearLayers();
+/** The ways along points of a rover's track: a new one begins with another task, and where nobody saw the rover. */
+export function waysOf(points, vehicle) {
+  const ways = [];
+  for (const [at, each] of points.entries()) {
+    const [, north, east, , task] = each;
+    const to = place.point({ north, east }, vehicle);
+    if (!to) continue;
+    const isCut = !ways.length || isGap(points[at - 1], each);
+    if (isCut || ways.at(-1).task !== task) ways.push({ task, places: isCut ? [] : ways.at(-1).places.slice(-1) });
+    ways.at(-1).places.push(to);
   }
-  for (; drawn.count < points.length; drawn.count += 1) {
-    const [, north, east, , task] = points[drawn.count];
-    const at = place.point({ north, east }, vehicle);
-    if (!at) continue;
-    let piece = drawn.pieces[drawn.pieces.length - 1];
-    const isCut = drawn.count > 0 && isGap(points[drawn.count - 1], points[drawn.count]);
-    if (isCut) drawn.last = null;
-    if (!piece || isCut || piece.task !== task || piece.places.length >= PIECE) {
-      finish(piece);
-      const line = L.polyline([], { color: taskColour(task), weight: task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }).addTo(drawn.layer);
-      piece = { task, line, places: drawn.last ? [drawn.last] : [], finished: 0 };
-      drawn.pieces.push(piece);
-    }
-    piece.places.push(at);
-    drawn.last = at;
-    drawn.total += 1;
-  }
-  finish(drawn.pieces[drawn.pieces.length - 1]);
-  while (drawn.total > most + PIECE && drawn.pieces.length > 1) {
-    const oldest = drawn.pieces.shift();
-    oldest.line.remove();
-    drawn.total -= oldest.places.length - 1;
-  }
+  return ways;
 }
 
-function finish(piece) {
-  if (!piece || piece.finished === piece.places.length) return;
-  piece.line.setLatLngs(piece.places);
-  piece.finished = piece.places.length;
+// Only the last piece is drawn again: a track has thousands of points and grows ten times a second. Short pieces,
+// because Leaflet projects all points of a line again when one is added.
+function extend(drawn, { points, revision }, vehicle, most) {
+  const shown = `${revision} ${most} ${place.placed(vehicle)}`;
+  if (drawn.shown !== shown) {
+    Object.assign(drawn, { shown, count: 0, pieces: new Map() });
+    drawn.layer.clearLayers();
+  }
+  const pieceAt = (count) => Math.max(0, Math.floor(count / PIECE));
+  const first = pieceAt(points.length - most);
+  for (let at = Math.max(first, pieceAt(drawn.count - 1)); at * PIECE < points.length && drawn.count < points.length; at += 1) {
+    drawn.pieces.get(at)?.remove();
+    const ways = waysOf(points.slice(Math.max(0, at * PIECE - 1), (at + 1) * PIECE), vehicle);
+    const lines = ways.map(({ task, places }) => L.polyline(places, { color: taskColour(task), weight: task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }));
+    drawn.pieces.set(at, L.layerGroup(lines).addTo(drawn.layer));
+  }
+  drawn.count = points.length;
+  for (const [at, piece] of drawn.pieces) if (at < first && drawn.pieces.delete(at)) piece.remove();
 }
 
 async function load(id, track, since) {
@@ -124,18 +119,14 @@ async function load(id, track, since) {
 /** Draw the goals of the tasks: those of queues that have changed. */
 export function drawGoals() {
   const most = shareOf(MOST_GOALS);
-  for (const queue of state.queues.values()) {
-    const vehicle = state.vehicles.get(queue.vehicle);
-    if (!vehicle || !isShown(queue.vehicle)) continue;
-    let drawn = goals.get(queue.vehicle);
-    if (!drawn) goals.set(queue.vehicle, (drawn = { layer: L.layerGroup().addTo(goalLayer) }));
-    const where = place.placed(vehicle);
-    if (drawn.queue === queue && drawn.most === most && drawn.where === where) continue;
-    Object.assign(drawn, { queue, most, where });
+  drawEach(goals, goalLayer, (id, vehicle, drawn) => {
+    const queue = state.queues.get(id);
+    const where = `${most} ${place.placed(vehicle)}`;
+    if (!queue || (drawn.queue === queue && drawn.where === where)) return;
+    Object.assign(drawn, { queue, where });
     drawn.layer.clearLayers();
     drawQueue(drawn.layer, queue, vehicle, most);
-  }
-  removeOthers(goals);
+  });
 }
 
 /** The goals of a task, null if they are not here yet: a queue has no long lists of them. */

@@ -1,4 +1,7 @@
-// Times, distances and states in words.
+// Times, distances and states in words; tasks by their names.
+
+import { h } from "./dom.js";
+import { showTask } from "./store.js";
 
 /** "3 s", "2 min", "1 h 5 min" */
 export function duration(seconds) {
@@ -51,6 +54,16 @@ export const progressWords = (task) => joined(
 
 /** The name of a task: "Task 12 “to the gate”: move 2 m". */
 export const taskName = (task) => `Task ${task.id}${task.label ? ` “${task.label}”` : ""}: ${task.what}`;
+
+/** A link to a task, which opens without loading the page again. */
+export function taskLink(id, words) {
+  const onclick = (event) => {
+    if (event.ctrlKey || event.metaKey || event.shiftKey) return;
+    event.preventDefault();
+    showTask(id);
+  };
+  return h("a", { href: `/tasks/${id}`, onclick }, words);
+}
 
 /** One of a fixed set of colours for each task. */
 export function taskColour(task) {
