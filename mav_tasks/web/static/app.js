@@ -1,4 +1,4 @@
-// Begins everything, STOP first: whatever fails after it, it works. The map and permalinks need to know who I am.
+// Begins everything, STOP first: whatever fails after it, it works. Tabs, views and permalinks.
 
 import "./stop.js";
 import "./rovers.js";
@@ -7,21 +7,22 @@ import "./past.js";
 import "./records.js";
 import "./texts.js";
 import "./timeline.js";
-import { connect } from "./connection.js";
+import "./connection.js";
 import { draw, h } from "./dom.js";
-import * as map from "./map.js";
 import { change, onChange, showPath, showTask, state } from "./store.js";
 
 const TABS = { queue: "Queue", past: "Past", records: "Recorded", texts: "Texts" };
 onChange(["session"], drawTabs);
 drawTabs();
-views();
-connect(async () => {
-  await import("/static/leaflet/leaflet.js"); // not before the page shows rovers and STOP
-  map.begin();
-  addEventListener("popstate", showPath);
-  showPath();
-});
+addEventListener("popstate", showPath);
+
+const views = document.querySelectorAll("[data-show]");
+for (const view of views) {
+  view.onclick = () => {
+    document.body.dataset.view = view.dataset.show;
+    for (const each of views) each.ariaPressed = String(each === view);
+  };
+}
 
 function drawTabs() {
   const all = Object.keys(TABS).filter((name) => name !== "records" || state.session?.records);
@@ -44,14 +45,4 @@ function choose(tab) {
   state.tab = tab;
   change("tab");
   drawTabs();
-}
-
-function views() {
-  const all = document.querySelectorAll("[data-show]");
-  for (const button of all) {
-    button.onclick = () => {
-      document.body.dataset.view = button.dataset.show;
-      for (const each of all) each.ariaPressed = String(each === button);
-    };
-  }
 }

@@ -4,7 +4,8 @@
 import { failureWords, get, post, sentence } from "./api.js";
 import { ask } from "./dialogs.js";
 import { button, draw, h } from "./dom.js";
-import { change, now, onChange, state, takeClock, takeQueue, takeQueueChange, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
+import { begin as beginMap } from "./map.js";
+import { change, now, onChange, showPath, state, takeClock, takeQueue, takeQueueChange, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
 import { duration } from "./words.js";
 
 const SILENT = 15; // s; the web process sends something every 10 s
@@ -14,13 +15,6 @@ const link = document.getElementById("link");
 let source = null;
 let triedAt = 0; // when the stream was opened
 let first = null; // session of the process that this page came from
-let begin = null;
-
-/** Read the session, and open the stream; in between, the first time, begin what needs a session. */
-export function connect(beginning) {
-  begin = beginning;
-  start();
-}
 
 async function start() {
   try {
@@ -32,7 +26,9 @@ async function start() {
     return;
   }
   if (!source) {
-    await begin();
+    await import("/static/leaflet/leaflet.js"); // not before the page shows rovers and STOP
+    beginMap();
+    showPath();
     onChange(["server", "clock", "session", "whole"], drawLink);
     setInterval(watch, 1000);
   }
@@ -156,3 +152,5 @@ function drawNews({ version, tiles }) {
   if (news.length) news.push("To use what is new, load this page again; what you have typed into it is lost.");
   draw(document.getElementById("news"), h("span", { role: "status" }, news.join(" ")), news.length > 0 && button("Load again", () => location.reload()));
 }
+
+start();

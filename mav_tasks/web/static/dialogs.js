@@ -41,7 +41,6 @@ export function ask({ title, words = [], word, act, fields = [], isBeside = fals
   return form;
 }
 
-/** Close the open dialogue. */
 export function close() {
   if (!open) return;
   const { cover, before, around, onClose } = open;

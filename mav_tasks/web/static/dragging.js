@@ -1,7 +1,29 @@
-// Dragging a row of a list onto another one: with a mouse anywhere on it, with a finger or a pen by its handle, so
-// that a finger on the row still scrolls. Escape ends it, and so does the browser (pointercancel).
+// Dragging: a row of a list onto another one, with a mouse anywhere on it, with a finger or a pen by its handle, so that
+// a finger on the row still scrolls. Escape ends it, and so does the browser (pointercancel).
 
 const FEW = 5; // px before it is a drag
+
+/** Follow a pointer that is pressed on an element: it "moved" as a drag; it "ended", and whether it was let go as one. */
+export function follow(element, pressed, moved, ended = () => {}) {
+  const listeners = new AbortController();
+  const on = (target, kind, act) => target.addEventListener(kind, act, { signal: listeners.signal });
+  let isDragged = false;
+  const end = (isReleased) => {
+    listeners.abort();
+    ended(isReleased && isDragged);
+  };
+  on(element, "pointermove", (event) => {
+    if (event.pointerId !== pressed.pointerId) return;
+    if (!isDragged && Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) < FEW) return;
+    if (!isDragged) element.setPointerCapture(event.pointerId); // what is below it is not clicked then
+    isDragged = true;
+    moved(event);
+  });
+  for (const kind of ["pointerup", "pointercancel"]) {
+    on(element, kind, (event) => event.pointerId === pressed.pointerId && end(kind === "pointerup"));
+  }
+  on(document, "keydown", (event) => event.key === "Escape" && end(false));
+}
 
 /**
  * Let the rows of a list be dragged that are "movable" and have a "grip".
@@ -14,51 +36,25 @@ export function makeDraggable(list, over, drop) {
   list.addEventListener("pointerdown", (event) => {
     const row = event.target.closest(".movable");
     const isOnRow = event.pointerType === "mouse" && !event.target.closest("button");
-    if (row && event.button === 0 && event.isPrimary && (isOnRow || event.target.closest(".grip"))) follow(row, event);
-  });
-
-  function follow(row, pressed) {
-    const listeners = new AbortController();
-    let isDragged = false;
-    let target = null;
-    let at = pressed;
-
+    if (!row || event.button !== 0 || !event.isPrimary || !(isOnRow || event.target.closest(".grip"))) return;
+    let [target, at] = [null, null];
     const look = () => {
-      if (!row.isConnected) return end(); // it runs now, or somebody cancelled it
-      const found = document.elementFromPoint(at.clientX, at.clientY)?.closest(".movable") ?? null;
-      const next = found === row ? null : found;
-      if (next === target) return;
-      target = next;
+      if (!at) return;
+      // it may run now, or somebody may have cancelled it
+      const found = row.isConnected && document.elementFromPoint(at.clientX, at.clientY)?.closest(".movable");
+      target = found && found !== row ? found : null;
       target?.scrollIntoView({ block: "nearest", behavior: "smooth" }); // at an edge of the pane it goes on from row to row
       over(row, target);
     };
-    const end = () => {
-      listeners.abort();
-      if (!isDragged) return;
-      over(null, null);
-      // the click that follows on the row is none
-      const stop = (event) => (event.preventDefault(), event.stopPropagation());
-      row.addEventListener("click", stop, { capture: true, once: true });
-      setTimeout(() => row.removeEventListener("click", stop, { capture: true }));
-    };
-    const on = (kind, act) => document.addEventListener(kind, (event) => {
-      if (event.pointerId === pressed.pointerId) act(event);
-    }, { signal: listeners.signal });
-    on("pointermove", (event) => {
-      at = event;
-      if (!isDragged) {
-        if (Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) < FEW) return;
-        isDragged = true;
-        over(row, null);
-      }
+    const pane = list.closest(".pane");
+    pane.addEventListener("scroll", look);
+    follow(list, event, (later) => {
+      at = later;
       look();
+    }, (isReleased) => {
+      pane.removeEventListener("scroll", look);
+      if (isReleased && target) drop(row, target);
+      over(null, null);
     });
-    on("pointerup", () => {
-      if (isDragged && target) drop(row, target);
-      end();
-    });
-    on("pointercancel", end);
-    list.closest(".pane").addEventListener("scroll", look, { signal: listeners.signal });
-    document.addEventListener("keydown", (event) => event.key === "Escape" && end(), { signal: listeners.signal });
-  }
+  });
 }

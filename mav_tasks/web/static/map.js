@@ -4,7 +4,7 @@ import { get, request } from "./api.js";
 import { confirmGoal, may } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { button, draw, h, make } from "./dom.js";
-import { change, choose, dataAge, onChange, state } from "./store.js";
+import { ageOf, change, choose, onChange, state } from "./store.js";
 import * as tracks from "./tracks.js";
 import { taskColour } from "./words.js";
 
@@ -122,7 +122,7 @@ function drawRovers() {
     const mark = marks.get(id) ?? makeMark(id, at, map);
     marks.set(id, mark);
     if (follow.checked && id === state.chosen && !mark.getLatLng().equals(at)) map.panTo(at, { animate: false });
-    const age = dataAge(vehicle);
+    const age = ageOf(vehicle, "data_age");
     const isOld = !heard || age === null || age > OLD || state.stream !== "open";
     turnMark(mark, at, heading, isOld ? "old" : control);
   }
@@ -147,7 +147,6 @@ function turnMark(mark, at, heading, kind) {
   element.firstChild.style.transform = `rotate(${heading ?? 0}deg)`;
 }
 
-/** Look at all rovers. */
 function fit() {
   isFitted = marks.size > 0;
   if (isFitted) lookAt(L.latLngBounds([...marks.values()].map((mark) => mark.getLatLng())).pad(0.4), { maxZoom: hasTiles ? 19 : 4 });
@@ -169,7 +168,6 @@ function centre() {
 
 const points = (places, vehicle) => places.map((place) => point(place, vehicle)).filter(Boolean);
 
-/** Draw a path, rally points and the shapes of a fence. */
 function drawGround(layer, { fence, rally, path }, vehicle, style) {
   const way = points(path, vehicle);
   if (way.length > 1) L.polyline(way, { ...style, interactive: false }).addTo(layer);

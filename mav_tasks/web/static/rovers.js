@@ -3,7 +3,7 @@
 import * as acts from "./acts.js";
 import { button, draw, failureLine, h } from "./dom.js";
 import { stopButton } from "./stop.js";
-import { choose, dataAge, linkAge, onChange, state } from "./store.js";
+import { ageOf, choose, onChange, state } from "./store.js";
 import { duration } from "./words.js";
 
 const list = document.getElementById("rovers");
@@ -46,10 +46,7 @@ function card(rover) {
 }
 
 /** Parts that follow each other, each of which stays on one line. */
-function partsOf(parts) {
-  const all = parts.filter(Boolean);
-  return all.map((part, at) => h("span", { class: "part" }, at < all.length - 1 ? `${part} ·` : part));
-}
+const partsOf = (parts) => parts.filter(Boolean).map((part) => h("span", { class: "part" }, part));
 
 // nothing newer comes: what a card says may have changed
 const isCutOff = () => state.stream !== "open" || !state.server.reachable;
@@ -70,7 +67,7 @@ function factsOf({ kind, mode, armed, speed, battery }) {
 }
 
 function agesOf(rover, queue) {
-  const [link, data] = [linkAge(rover), dataAge(rover)];
+  const [link, data] = [ageOf(rover, "heartbeat_age"), ageOf(rover, "data_age")];
   return [
     isCutOff() ? "link unknown" : link === null ? "not heard since the server started" : link < OLD ? "link good" : `not heard for ${duration(link)}`,
     data === null ? "no position" : data < OLD ? `position ${data < 1 ? "< 1" : Math.round(data)} s old` : `position is ${duration(data)} old`,

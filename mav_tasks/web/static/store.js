@@ -27,7 +27,6 @@ export function onChange(names, view) {
   listeners.push({ names, view });
 }
 
-/** Note that parts of the state have changed. */
 export function change(...names) {
   if (!changed.size) {
     // a page in the background gets no frames, and must be right when it is looked at again
@@ -56,7 +55,6 @@ export function takeClock(at) {
 /** Seconds since 1970, by the clock of the web process. */
 export const serverNow = () => Date.now() / 1000 + clockAhead;
 
-/** Take the states of rovers. */
 export function takeVehicles(vehicles) {
   for (const vehicle of vehicles) {
     vehicle.takenAt = now();
@@ -133,22 +131,15 @@ export function showTask(id) {
 /** Show what the address of the page says: /tasks/12 is a task. */
 export const showPath = () => showTask(Number(location.pathname.match(/^\/tasks\/(\d+)$/)?.[1]) || null);
 
-/** Choose a rover. */
 export function choose(vehicle) {
   state.chosen = vehicle;
   change("chosen", "queues", "vehicles");
 }
 
-/** The queue of the chosen rover. */
 export const chosenQueue = () => state.queues.get(state.chosen);
 
-const agedBy = (age, vehicle) => (age === null ? null : age + (now() - vehicle.takenAt));
-
-/** How old the position of a rover is now, s; null: it has none. */
-export const dataAge = (vehicle) => agedBy(vehicle.data_age, vehicle);
-
-/** How long ago its heartbeat was, s; null: not known. */
-export const linkAge = (vehicle) => agedBy(vehicle.heartbeat_age, vehicle);
+/** How old something of a rover is now, s, by its age when it came; null: not known. */
+export const ageOf = (vehicle, name) => (vehicle[name] === null ? null : vehicle[name] + now() - vehicle.takenAt);
 
 /** What a person has chosen of the view: of this browser, or until the page is closed if it keeps nothing. */
 export const kept = (() => {

@@ -2,6 +2,7 @@
 // moves it. A longer time needs more of the past than the list beside it has at first.
 
 import { button, draw, h, make } from "./dom.js";
+import { follow } from "./dragging.js";
 import * as past from "./past.js";
 import { chosenQueue, kept, onChange, serverNow, showTask } from "./store.js";
 import { taskName } from "./words.js";
@@ -14,7 +15,6 @@ const TICKS = [60, 120, 300, 600, 1800, 3600, 7200, 10800, 21600]; // s between 
 const ROOM = 58; // px for a time
 const SHORTEST = 5; // s
 const WHEEL = 60; // px of a wheel or touch pad for one step
-const FEW = 4; // px that a pointer moves before it drags
 
 const place = document.getElementById("timeline");
 const strip = make(h("div", { class: "strip", role: "group", tabindex: 0 }));
@@ -70,19 +70,8 @@ function onWheel(event) {
 }
 
 function onPointer(event) {
-  if (event.button !== 0) return;
   const begins = middle ?? serverNow();
-  const ended = new AbortController();
-  let isDragged = false;
-  const on = (kind, act) => strip.addEventListener(kind, act, { signal: ended.signal });
-  on("pointermove", (later) => {
-    const by = later.clientX - event.clientX;
-    if (later.pointerId !== event.pointerId || (!isDragged && Math.abs(by) < FEW)) return;
-    if (!isDragged) strip.setPointerCapture(event.pointerId); // the bar below it is not clicked then
-    isDragged = true;
-    moveTo(begins - (by * span) / strip.clientWidth);
-  });
-  for (const end of ["pointerup", "pointercancel"]) on(end, () => ended.abort());
+  if (event.button === 0) follow(strip, event, (later) => moveTo(begins - ((later.clientX - event.clientX) * span) / strip.clientWidth));
 }
 
 /** The tasks between two times, the earliest first. */
