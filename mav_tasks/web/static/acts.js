@@ -80,7 +80,6 @@ function choice(ways, first) {
   return h("div", {}, h("label", {}, "How: ", h("select", { name: "how", onchange, value: first }, options)), consequence);
 }
 
-/** Submit a goal, and say before what will happen. */
 export function confirmGoal(vehicle, goal, title) {
   ask({ title, words: [consequenceOf(vehicle)], word: "Add the task", act: (_, key) => post(`/vehicles/${vehicle}/tasks`, { goals: [goal] }, { key }) });
 }

@@ -12,16 +12,19 @@ import { draw, h } from "./dom.js";
 import { change, onChange, showPath, showTask, state } from "./store.js";
 
 const TABS = { queue: "Queue", past: "Past", records: "Recorded", texts: "Texts" };
+const VIEWS = { rovers: "Rovers", map: "Map", side: "Tasks" }; // on a phone, one at a time
 onChange(["session"], drawTabs);
 drawTabs();
+drawViews();
 addEventListener("popstate", showPath);
 
-const views = document.querySelectorAll("[data-show]");
-for (const view of views) {
-  view.onclick = () => {
-    document.body.dataset.view = view.dataset.show;
-    for (const each of views) each.ariaPressed = String(each === view);
-  };
+function drawViews() {
+  draw(document.querySelector(".views"), Object.entries(VIEWS).map(([name, words]) => h("button", {
+    key: name, type: "button", "data-show": name, "aria-pressed": String(name === document.body.dataset.view), onclick: () => {
+      document.body.dataset.view = name;
+      drawViews();
+    },
+  }, words)));
 }
 
 function drawTabs() {

@@ -5,7 +5,7 @@ import { failureWords, get, post, sentence } from "./api.js";
 import { ask } from "./dialogs.js";
 import { button, draw, h } from "./dom.js";
 import { begin as beginMap } from "./map.js";
-import { change, now, onChange, showPath, state, takeClock, takeQueue, takeQueueChange, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
+import { change, now, onChange, showPath, state, takeQueue, takeQueueChange, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
 import { duration } from "./words.js";
 
 const SILENT = 15; // s; the web process sends something every 10 s
@@ -81,17 +81,13 @@ const TAKES = {
     for (const known of [state.vehicles, state.queues]) known.clear();
     Object.assign(state, { texts: [], areTextsWhole: false, stops: [], server: { reachable: all.reachable, detail: all.detail } });
     if (state.one) state.one.version = 0; // another server may count from the beginning
-    takeClock(all.now);
     for (const stop of all.stops) takeStop(stop, all.now - stop.at);
-    takeVehicles(all.vehicles);
+    takeVehicles(all);
     all.queues.forEach(takeQueue);
     takeTexts(all.texts);
     change("stops", "server", "tasks", "whole");
   },
-  vehicles: (news) => {
-    takeClock(news.now);
-    takeVehicles(news.vehicles);
-  },
+  vehicles: takeVehicles,
   queue: takeQueueChange,
   task: takeTask,
   text: (text) => takeTexts([text]),

@@ -13,16 +13,14 @@ export const h = (tag, { key, ...properties } = {}, ...children) => ({ tag, key,
 /** A button that is not the main one of its place. */
 export const button = (words, onclick, properties) => h("button", { class: "small", type: "button", onclick, ...properties }, words);
 
-/** Make an element of its description. */
 export const make = (child) => shown(undefined, child);
 
 /** Let an element show texts, descriptions and other elements: what stays keeps its focus, and what was typed into it. */
 export function draw(element, ...children) {
   const focused = element.contains(document.activeElement) ? document.activeElement : null;
   fill(element, children);
-  if (!focused) return;
-  if (!element.contains(focused) || !focused.checkVisibility()) focusNear(element);
-  else if (focused !== document.activeElement) focused.focus({ preventScroll: true });
+  if (focused && !(element.contains(focused) && focused.checkVisibility())) focusNear(element);
+  else if (focused !== document.activeElement) focused?.focus({ preventScroll: true });
 }
 
 function fill(element, children) {
@@ -96,8 +94,4 @@ export function failureLine() {
 }
 
 /** Focus what is around a place whose focused element is gone: a keyboard does not begin at the top again. */
-export function focusNear(element) {
-  let place = element;
-  while (place && (place.hidden || !place.hasAttribute("tabindex"))) place = place.parentElement;
-  (place ?? document.getElementById("main")).focus({ preventScroll: true });
-}
+export const focusNear = (element) => (element?.closest("[tabindex]:not([hidden])") ?? document.getElementById("main")).focus({ preventScroll: true });

@@ -26,10 +26,8 @@ export function follow(element, pressed, moved, ended = () => {}) {
 }
 
 /**
- * Let the rows of a list be dragged that are "movable" and have a "grip".
- * @param {HTMLElement} list
- * @param {(row: HTMLElement|null, target: HTMLElement|null) => void} over is told of each new target; null: of none, and of no row at the end
- * @param {(row: HTMLElement, target: HTMLElement) => void} drop comes before that
+ * Let the rows of a list be dragged that are "movable" and have a "grip". "over" is told which row is dragged, and over which
+ * one it is; of null for both at the end. "drop" comes before that.
  */
 export function makeDraggable(list, over, drop) {
   list.addEventListener("dragstart", (event) => event.preventDefault()); // of a link

@@ -47,20 +47,12 @@ export function begin() {
   follow.addEventListener("change", centre);
   map.on("dragstart", () => (follow.checked = false));
   map.on("click", (event) => clicked(event.latlng));
-  map.getContainer().addEventListener("keydown", (event) => {
-    if (event.key !== "Enter" || event.target !== map.getContainer()) return;
-    event.preventDefault();
-    clicked(map.getCenter());
-  });
+  map.on("keypress", ({ originalEvent: { key, target } }) => key === "Enter" && target === map.getContainer() && clicked(map.getCenter()));
   new ResizeObserver(() => {
     map.invalidateSize();
     if (awaited) lookAt(...awaited);
   }).observe(document.getElementById("map"));
-  onChange(["whole"], () => {
-    for (const mark of marks.values()) mark.remove();
-    marks.clear();
-  });
-  onChange(["vehicles", "clock"], drawRovers);
+  onChange(["vehicles", "clock", "whole"], drawRovers);
   onChange(["chosen", "session"], centre);
   onChange(["vehicles", "chosen", "queues"], tracks.drawTracks);
   onChange(["vehicles", "queues", "chosen", "tasks"], tracks.drawGoals);
@@ -84,11 +76,9 @@ export async function loadGround() {
 
 /** The point of the map for a place, of a rover's frame or on earth; null: not known. */
 function point(place, vehicle) {
-  const origin = vehicle?.origin;
-  const { latitude, longitude } = place.latitude === undefined && origin ? onEarth(origin, place.north, place.east) : place;
-  const isKnown = (latitude ?? null) !== null;
-  if (hasTiles) return isKnown ? [latitude, longitude] : null;
-  if (isKnown && reference) return offset(reference, latitude, longitude);
+  const { latitude = null, longitude } = place.latitude === undefined && vehicle?.origin ? onEarth(vehicle.origin, place.north, place.east) : place;
+  if (hasTiles) return latitude === null ? null : [latitude, longitude];
+  if (latitude !== null && reference) return offset(reference, latitude, longitude);
   return place.north === undefined ? null : [place.north, place.east];
 }
 
@@ -115,6 +105,7 @@ function here({ north, east, latitude, longitude, origin }) {
 
 function drawRovers() {
   if (isPast) return;
+  for (const [id, mark] of marks) if (!state.vehicles.has(id) && marks.delete(id)) mark.remove();
   for (const vehicle of state.vehicles.values()) {
     const { vehicle: id, heard, heading, control } = vehicle;
     const at = here(vehicle);
@@ -133,10 +124,7 @@ function makeMark(id, at, layer) {
   const shape = '<svg viewBox="0 0 28 28"><path class="shape" d="M14 2 L23 25 L14 20 L5 25 Z"/></svg>';
   const icon = L.divIcon({ html: `${shape}<span class="number">${Number(id)}</span>`, className: "rover-mark", iconSize: [28, 28], iconAnchor: [14, 14] });
   const mark = L.marker(at, { icon, keyboard: true, alt: `Rover ${id}`, title: `Rover ${id}` });
-  mark.on("click", () => {
-    choose(id);
-    centre();
-  });
+  mark.on("click", () => choose(id));
   return mark.addTo(layer);
 }
 
@@ -250,15 +238,13 @@ function clicked(latlng) {
   const heading = round(((Math.atan2(east, north) * 180) / Math.PI + 360) % 360, 1);
   const away = Math.hypot(north, east);
   const id = vehicle.vehicle;
-  const option = (isOffered, words, act) => isOffered && button(words, () => {
-    map.closePopup();
-    act();
-  });
+  const option = (isOffered, words, act) => isOffered && button(words, act);
   const box = make(h("div", {}, h("p", {}, `Rover ${id}`), h("div", { class: "row" },
     option(may("submit"), `Go here (${away.toFixed(1)} m)…`, () => confirmGoal(id, target, `Send rover ${id} here, ${away.toFixed(1)} m away?`)),
     option(may("submit"), `Face here (${Math.round(heading)}°)…`, () => confirmGoal(id, { kind: "face", heading }, `Turn rover ${id} to ${Math.round(heading)}°?`)),
     option(may("fence") && "latitude" in place, "Fence here…", () => fenceHere(id, place)),
     option(may("fence") && state.grounds.get(id)?.fence.length, "Remove its fence…", () => removeFence(id)))));
+  box.onclick = () => map.closePopup();
   const first = box.querySelector("button");
   if (!first) return;
   L.popup({ closeButton: true, autoPan: true }).setLatLng(latlng).setContent(box).openOn(map);

@@ -4,9 +4,9 @@ import { failureWords, get } from "./api.js";
 import * as acts from "./acts.js";
 import { button, draw, failureLine, h } from "./dom.js";
 import { showTrack } from "./map.js";
-import { change, onChange, serverNow, showTask, state } from "./store.js";
+import { change, onChange, showTask, state } from "./store.js";
 import { openChangeForm } from "./task_form.js";
-import { ACTIVE, OVER, WAITING, clock, duration, joined, progressWords, quick, stateWords, taskLink, taskName } from "./words.js";
+import { ACTIVE, OVER, WAITING, clock, duration, endedAt, joined, progressWords, quick, stateWords, taskLink, taskName } from "./words.js";
 
 const detail = document.getElementById("panel-task");
 const LISTED = 100;
@@ -17,7 +17,7 @@ let loadedFor = "";
 let whole = { vehicle: 0, wanted: 0 }; // what "tasks" has
 
 onChange(["route"], open);
-onChange(["one", "session"], drawOne);
+onChange(["one", "session", "queues"], drawOne); // a release carries the halt epoch of the queue
 onChange(["chosen", "tasks", "queues", "whole"], refresh);
 
 /** Load more finished tasks than the list has at first. */
@@ -29,7 +29,7 @@ export function loadMore(count) {
 }
 
 /** Since when all finished tasks are known, seconds since 1970; null: since the beginning. */
-export const knownSince = () => (tasks.length < whole.wanted || !tasks.length ? null : tasks.at(-1).endedAt);
+export const knownSince = () => (tasks.length < whole.wanted || !tasks.length ? null : endedAt(tasks.at(-1)));
 
 // The latest are fetched again when a task of the rover has ended; all of them, if older ones would be missing.
 async function refresh() {
@@ -41,12 +41,13 @@ async function refresh() {
   loadedFor = mark;
   let none = "No task has ended yet.";
   try {
-    let latest = await load(queue.vehicle, isWhole ? LISTED : wanted);
+    const load = async (count) => (await get(`/vehicles/${queue.vehicle}/history?limit=${count}`)).tasks;
+    let latest = await load(isWhole ? LISTED : wanted);
     let older = [];
     if (isWhole && latest.length === LISTED) { // else those are all
       const ids = new Set(latest.map((task) => task.id));
       older = tasks.filter((task) => !ids.has(task.id));
-      if (older.length === tasks.length) [latest, older] = [await load(queue.vehicle, wanted), []];
+      if (older.length === tasks.length) [latest, older] = [await load(wanted), []];
     }
     if (mark !== loadedFor) return; // another rover was chosen meanwhile, or another task has ended
     tasks = [...latest, ...older].slice(0, wanted);
@@ -60,16 +61,10 @@ async function refresh() {
   change("past");
 }
 
-async function load(vehicle, count) {
-  const { tasks: found } = await get(`/vehicles/${vehicle}/history?limit=${count}`);
-  for (const task of found) task.endedAt = task.ended_ago === null ? null : serverNow() - task.ended_ago;
-  return found;
-}
-
 const row = (task) => h("li", { key: task.id, class: "task" },
   h("div", { class: "line" }, h("span", { class: "title" }, taskLink(task.id, taskName(task))), h("span", { class: "state" }, stateWords(task))),
   h("p", { class: "why" }, joined(
-    task.endedAt && `ended ${clock(task.endedAt)}`,
+    task.ended_at && `ended ${clock(endedAt(task))}`,
     task.execution_time && `driven ${duration(task.execution_time)}`,
     task.why,
   )));
@@ -105,9 +100,8 @@ async function open() {
     const { count, rate, p50, p99, max, late } = found;
     timing = `${count} intervals at ${rate} Hz: median ${quick(p50)}, p99 ${quick(p99)}, longest ${quick(max)}, ${late} late`;
   }, (words) => (timing = `unknown: ${words}`));
-  none = "The web process reads no journal of this server: start it on the same machine, with --store.";
+  none = state.session.journal ? "Reading the journal…" : "The web process reads no journal of this server: start it on the same machine, with --store.";
   if (state.session.journal) {
-    none = "Reading the journal…";
     part("/journal", (found) => {
       entries = found.entries;
       none = "The journal has nothing of this task.";
@@ -121,7 +115,7 @@ function drawOne() {
   draw(detail,
     button("← Back to the list", () => showTask(null)),
     h("h2", {}, task ? taskName(task) : `Task ${id}`),
-    h("dl", { class: "facts-table" }, task && factsOf(task).filter(([, value]) => value).map(([name, value]) => [h("dt", { key: name }, name), h("dd", { key: `${name} is` }, value)]).flat()),
+    h("dl", { class: "facts-table" }, task && factsOf(task).filter(([, value]) => value).flatMap(([name, value]) => [h("dt", { key: name }, name), h("dd", { key: `${name} is` }, value)])),
     failure.element,
     h("div", { class: "row" }, ...(task ? buttonsOf(task) : [])),
     h("h3", {}, "What happened"),
@@ -139,7 +133,7 @@ const factsOf = (task) => [
   ["Progress", ACTIVE.includes(task.state) && progressWords(task)],
   ["After", task.after && `task ${task.after}`],
   ["Driven", task.execution_time && duration(task.execution_time)],
-  ["Ended", task.ended_at && clock(Date.parse(task.ended_at) / 1000)],
+  ["Ended", task.ended_at && clock(endedAt(task))],
   ["Submitted by", task.submitted_by],
   ["Set-points", timing],
 ];

@@ -24,8 +24,8 @@ let telling = 0;
 onChange(["queues", "chosen", "tasks", "clock", "whole", "session"], drawAll);
 makeDraggable(list, (row, target) => {
   [dragged, over] = [row && idOf(row), target && idOf(target)];
-  if (over) tell(`Task ${dragged} will run ${isUp() ? "before" : "after"} task ${over}.`);
-  drawAll();
+  if (!over) return drawAll();
+  tell(`Task ${dragged} will run ${isUp() ? "before" : "after"} task ${over}.`);
 }, (row, target) => move(idOf(row), placeOf(idOf(target))));
 
 const idOf = (row) => Number(row.dataset.task);

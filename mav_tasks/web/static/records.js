@@ -13,9 +13,8 @@ const SCRUB = 1000; // places of the slider
 
 const failure = failureLine();
 let records = null;
-let reading = ""; // the name of the run that is read
-let run = null; // what is shown
-let name = ""; // of it
+let name = ""; // of the run that is read or shown
+let run = null; // the one that is shown
 let place = () => {};
 let at = 0;
 let speed = 5;
@@ -27,17 +26,17 @@ onChange(["tab"], () => {
 });
 
 async function open(chosen) {
-  reading = name = chosen;
+  name = chosen;
   drawAll();
   const isRead = await failure.trying(async () => (run = await get(`/records/${encodeURIComponent(chosen)}`, { within: 130000 })));
-  reading = "";
-  if (!isRead) return drawAll();
+  if (!isRead) return close();
   place = showRun(run);
   go(run.begins);
 }
 
 function close() {
   stop();
+  name = "";
   run = null;
   showRun(null);
   drawAll();
@@ -53,9 +52,7 @@ function go(wanted) {
   drawAll();
 }
 
-function drawAll() {
-  draw(panel, failure.element, ...(run ? drawRun() : drawList()));
-}
+const drawAll = () => draw(panel, failure.element, ...(run ? drawRun() : drawList()));
 
 const drawList = () => [
   h("ol", { key: "runs", class: "cards", "aria-label": "Recorded runs, the newest first" }, (records ?? []).map((each) => (
@@ -65,7 +62,7 @@ const drawList = () => [
         clock(each.changed), `${(each.bytes / 1e6).toFixed(1)} MB`,
         each.files.length === 2 ? "packets and decisions" : each.files[0].endsWith(".tlog") ? "packets" : "decisions",
       )))))),
-  h("p", { key: "none", class: "empty" }, reading ? `Reading ${reading}…` : records?.length === 0 && "No recording in this folder yet."),
+  h("p", { key: "none", class: "empty" }, name ? `Reading ${name}…` : records?.length === 0 && "No recording in this folder yet."),
 ];
 
 function drawRun() {

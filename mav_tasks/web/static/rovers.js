@@ -26,12 +26,11 @@ function card(rover) {
   const { vehicle: id, control } = rover;
   const queue = state.queues.get(id);
   const isChosen = state.chosen === id;
-  const isWell = control === "tasks" && rover.ready !== false;
   const isWaiting = control !== "tasks" || queue?.current?.state === "held";
   const mood = isCutOff() ? "" : ["silent", "stopped"].includes(control) ? "bad" : isWaiting ? "warn" : "";
   const checks = !rover.prearm.length && rover.ready === false && !rover.armed ? ["Its checks before arming fail."] : rover.prearm;
   const failure = failures.get(id) ?? failures.set(id, failureLine()).get(id);
-  const place = control === "silent" ? "silent" : isWell ? "" : "trouble";
+  const place = control === "silent" ? "silent" : control === "tasks" && rover.ready !== false ? "" : "trouble";
   return h("li", { key: id, class: `card ${place}${isChosen ? " chosen" : ""}${isCutOff() || !rover.heard ? " old" : ""}` },
     h("div", { class: "head" },
       h("button", { class: "pick", type: "button", "aria-pressed": String(isChosen), onclick: () => choose(id) }, `Rover ${id}`),

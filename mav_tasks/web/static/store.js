@@ -47,15 +47,12 @@ export const now = () => performance.now() / 1000;
 
 let clockAhead = 0; // s by which the clock of the web process is ahead of this device's
 
-/** Take the time of the web process: a tablet's own clock may be hours off. */
-export function takeClock(at) {
-  clockAhead = at - Date.now() / 1000;
-}
-
 /** Seconds since 1970, by the clock of the web process. */
 export const serverNow = () => Date.now() / 1000 + clockAhead;
 
-export function takeVehicles(vehicles) {
+/** Take the states of rovers, and the time of the web process: a tablet's own clock may be hours off. */
+export function takeVehicles({ now: at, vehicles }) {
+  clockAhead = at - Date.now() / 1000;
   for (const vehicle of vehicles) {
     vehicle.takenAt = now();
     state.vehicles.set(vehicle.vehicle, vehicle);
@@ -65,7 +62,6 @@ export function takeVehicles(vehicles) {
   change("vehicles");
 }
 
-/** Take a queue; it has its tasks in it. */
 export function takeQueue(queue) {
   state.queues.set(queue.vehicle, queue);
   [queue.current, ...queue.waiting].forEach(takeOne);
@@ -99,11 +95,8 @@ function takeOne(task) {
   change("one");
 }
 
-/** Take texts; "isOldest": they are older than all that are known, and whether there are no others. */
-export function takeTexts(texts, isOldest) {
-  const isOlder = isOldest !== undefined;
-  state.texts = isOlder ? [...texts, ...state.texts] : [...state.texts, ...texts].slice(-MOST_TEXTS);
-  if (isOlder) state.areTextsWhole = isOldest || state.texts.length >= MOST_TEXTS;
+export function takeTexts(texts) {
+  state.texts = [...state.texts, ...texts].slice(-MOST_TEXTS);
   change("texts");
 }
 

@@ -18,20 +18,19 @@ export function openTaskForm(vehicle) {
   const isOne = state.vehicles.size < 2;
   const fields = make(h("div"));
   let [kind, who, defaults] = [kinds[0], vehicle, {}];
-  const choice = (name, title, options, onchange) => h("label", { class: "fields" }, title, h("select", { name, onchange }, options.map(([value, words]) => h("option", { value }, words))));
+  const choice = (name, title, options) => h("label", { class: "fields" }, title, h("select", { name }, options.map(([value, words]) => h("option", { value }, words))));
   const drawFields = () => draw(fields,
-    !isOne && choice("rover", "Who ", [[vehicle, `Rover ${vehicle}`], [ANY, "Any rover"]], (event) => {
-      who = event.target.value;
-      drawFields();
-    }),
-    choice("kind", "What ", kinds.map((each) => [each.kind, each.title]), (event) => {
-      kind = kinds[event.target.selectedIndex];
-      drawFields();
-    }),
+    !isOne && choice("rover", "Who ", [[vehicle, `Rover ${vehicle}`], [ANY, "Any rover"]]),
+    choice("kind", "What ", kinds.map((each) => [each.kind, each.title])),
     h("small", {}, kind.meaning),
     h("div", { key: kind.kind }, fieldsOf(kind.numbers, {}, defaults)),
     fieldsOf(terms),
     h("p", { class: "empty", "aria-live": "polite" }, who === ANY ? ANY_WORDS : consequenceOf(vehicle)));
+  fields.onchange = ({ target }) => {
+    if (target.name === "rover") who = target.value;
+    if (target.name === "kind") kind = kinds[target.selectedIndex];
+    drawFields();
+  };
   drawFields();
   get(`/vehicles/${vehicle}/defaults`).then((found) => {
     defaults = found;
@@ -47,7 +46,6 @@ export function openTaskForm(vehicle) {
   });
 }
 
-/** Open the form that changes the terms of a task that waits. */
 export function openChangeForm(task) {
   const { changes } = state.session;
   ask({
@@ -67,7 +65,7 @@ export const fieldsOf = (parts, was = {}, defaults = {}) => h("div", { class: "f
 export function filledIn(form, parts, was = {}) {
   const values = {};
   for (const { name, type } of parts) {
-    const text = form.elements[name].value.trim();
+    const text = form.querySelector(`[name=${name}]`).value.trim();
     if (text !== String(was[name] ?? "").trim()) values[name] = valueOf(name, type, text);
   }
   return values;

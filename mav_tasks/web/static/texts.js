@@ -2,7 +2,7 @@
 
 import { get } from "./api.js";
 import { button, draw, failureLine, h } from "./dom.js";
-import { onChange, state, takeTexts } from "./store.js";
+import { onChange, state } from "./store.js";
 import { clock, counted, taskLink } from "./words.js";
 
 const panel = document.getElementById("panel-texts");
@@ -60,15 +60,14 @@ async function showOlder() {
   isAsking = true; // the button is not disabled: the keyboard stays on it
   drawAll();
   await failure.trying(async () => {
-    let found = before;
-    while (!isJournal() && !state.areTextsWhole && found < Math.min(most, before) + MORE) {
+    while (!isJournal() && !state.areTextsWhole && matching().length < Math.min(most, before) + MORE) {
       const first = state.texts[0];
       const { texts } = await get(`/texts?before=${first.number}&limit=${MORE}`);
       if (state.texts[0] !== first) break; // the web process was started again meanwhile
-      takeTexts(texts, texts.length < MORE);
-      found = matching().length;
+      state.texts = [...texts, ...state.texts];
+      state.areTextsWhole = texts.length < MORE || state.texts.length >= KEPT;
     }
-    const added = Math.min(found, most + MORE) - Math.min(before, most);
+    const added = Math.min(matching().length, most + MORE) - Math.min(before, most);
     most += MORE;
     said = added > 0 ? `${counted(added, "older line")} shown.` : "No older line fits these filters.";
   });

@@ -5,7 +5,7 @@ import { button, draw, h, make } from "./dom.js";
 import { follow } from "./dragging.js";
 import * as past from "./past.js";
 import { chosenQueue, kept, onChange, serverNow, showTask } from "./store.js";
-import { taskName } from "./words.js";
+import { endedAt, taskName } from "./words.js";
 
 const SPANS = { 600: "10 min", 3600: "1 h", 21600: "6 h", 86400: "24 h" }; // s
 const LENGTHS = Object.keys(SPANS).map(Number);
@@ -80,8 +80,8 @@ function shownBetween(first, last) {
   if (!queue) return [];
   const { vehicle, current, waiting } = queue;
   const present = serverNow();
-  const found = past.tasks.filter((task) => task.vehicle === vehicle && task.endedAt).map((task) => (
-    { task, from: task.endedAt - Math.max(task.execution_time ?? 0, SHORTEST), to: task.endedAt, kind: task.state }
+  const found = past.tasks.filter((task) => task.vehicle === vehicle && task.ended_at).map((task) => (
+    { task, from: endedAt(task) - Math.max(task.execution_time ?? 0, SHORTEST), to: endedAt(task), kind: task.state }
   ));
   const free = present + (current ? current.time_to_finish ?? 60 : 0);
   if (current) found.push({ task: current, from: present - (current.execution_time ?? 0), to: free, kind: "now" });

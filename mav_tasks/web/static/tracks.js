@@ -116,7 +116,6 @@ async function load(id, track, since) {
   change("vehicles");
 }
 
-/** Draw the goals of the tasks: those of queues that have changed. */
 export function drawGoals() {
   const most = shareOf(MOST_GOALS);
   drawEach(goals, goalLayer, (id, vehicle, drawn) => {

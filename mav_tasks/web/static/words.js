@@ -13,11 +13,8 @@ export function duration(seconds) {
   return `${Math.floor(whole / unit)} ${large}${left ? ` ${left} ${small}` : ""}`;
 }
 
-/** Milliseconds below a second, else seconds with a decimal; "": not known. */
-export function quick(seconds) {
-  if (seconds === null) return "";
-  return seconds < 1 ? `${Math.round(seconds * 1000)}\u00a0ms` : `${seconds.toFixed(1)}\u00a0s`;
-}
+/** Milliseconds below a second, else seconds with a decimal. */
+export const quick = (seconds) => (seconds < 1 ? `${Math.round(seconds * 1000)}\u00a0ms` : `${seconds.toFixed(1)}\u00a0s`);
 
 /** The local time of seconds since 1970; of another day with its date. */
 export function clock(seconds) {
@@ -31,6 +28,9 @@ export const counted = (count, what) => `${count} ${what}${count === 1 ? "" : "s
 
 /** Those of the parts that there are. */
 export const joined = (...parts) => parts.filter(Boolean).join(" · ");
+
+/** When a task ended, seconds since 1970. */
+export const endedAt = (task) => Date.parse(task.ended_at) / 1000;
 
 // beside the word of a state, so that colour is not needed to tell them apart
 const MARKS = {
@@ -65,8 +65,7 @@ export function taskLink(id, words) {
   return h("a", { href: `/tasks/${id}`, onclick }, words);
 }
 
+const COLOURS = ["#0b84a5", "#d1602d", "#6a4fb3", "#2f8f4e", "#b3468a", "#8a6d00", "#3b6fd4", "#a23b3b"];
+
 /** One of a fixed set of colours for each task. */
-export function taskColour(task) {
-  const colours = ["#0b84a5", "#d1602d", "#6a4fb3", "#2f8f4e", "#b3468a", "#8a6d00", "#3b6fd4", "#a23b3b"];
-  return task === null ? "#8a9693" : colours[task % colours.length];
-}
+export const taskColour = (task) => (task === null ? "#8a9693" : COLOURS[task % COLOURS.length]);
