@@ -143,57 +143,44 @@ def test_a_process_ends_with_the_same_status() -> None:
         assert own.status in (2, 3)
 
 
+#: FIRST waits for 60 s, LATER moves in an hour
+LOOKED_AT = """modify LATER --label dock-3 => 0 rover 1: task LATER changed
+modify LATER --priority 9 => 0 rover 1: task LATER changed
+queue --json => "running": FIRST, … "paused": null, … "waiting_count": 1, … "id": LATER, … \
+"priority": 8, … "priority": 9, … "left_unit": "s"
+status LATER => goal          move -2 m … label         dock-3 … reason        start time
+cancel --json => {"done": "cancel", "task": FIRST, "vehicle": 1}
+status FIRST --json => "state": "cancel
+clear => 0 rover 1: all waiting tasks cancelled
+cancel LATER => 1 mav-tasks: … has ended"""
+
+
 def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> None:
     began = mav_tasks("submit", "wait", "60s", "--priority", "8", server=server)
     assert began.status == 0, began.error  # a busy machine may tell that it waits for a position
-    first = int(began.output.removeprefix("rover 1: task "))
+    first = began.output.removeprefix("rover 1: task ").strip()
 
     (waiting,) = called("submit", "move", "-2", "--in", "1h", "--json", server=server).objects
-    assert waiting["id"] > first
     assert (waiting["what"], waiting["state"]) == ("move -2 m", "scheduled")
     assert (waiting["left"], waiting["left_unit"], waiting["vehicle"]) == (2.0, "m", 1)
     assert 3500 < waiting["time_to_start"] <= 3620
 
-    named = called("modify", str(waiting["id"]), "--label", "dock 3", server=server)
-    assert named.lines == [f"rover 1: task {waiting['id']} changed"]
-
-    changed = called("modify", str(waiting["id"]), "--priority", "9", server=server)
-    assert changed.lines == [f"rover 1: task {waiting['id']} changed"]
-
-    (queue,) = called("queue", "--json", server=server).objects
-    assert (queue["running"], queue["paused"], queue["waiting_count"]) == (first, None, 1)
-    assert (queue["current"]["priority"], queue["current"]["left_unit"]) == (8, "s")
-    assert [(task["id"], task["priority"]) for task in queue["waiting"]] == [(waiting["id"], 9)]
+    looked_at = LOOKED_AT.replace("FIRST", first).replace("LATER", str(waiting["id"]))
+    changes, calling_off = looked_at.split("\ncancel --json")
+    session(server, changes)
+    table = mav_tasks("queue", server=server)
+    assert table.lines[0].startswith(f"rover 1: task {first} ")
+    assert "\x1b" not in table.output
+    assert all(line == line.rstrip() for line in table.lines)
+    assert table.lines[2].split()[:5] == ["id", "prio", "state", "label", "goal"]
+    assert [line.split()[0] for line in table.lines[3:]] == [first, str(waiting["id"])]
 
     (later,) = called("submit", "move", "1", "--json", server=server).objects
     (last,) = called("submit", "move", "1", "--json", server=server).objects
     called("modify", str(last["id"]), "--before", str(later["id"]), server=server)
     (queue,) = called("queue", "--json", server=server).objects
     assert [task["id"] for task in queue["waiting"]][:2] == [last["id"], later["id"]]
-    for each in (last, later):
-        assert called("cancel", str(each["id"]), server=server).status == 0
-
-    table = mav_tasks("queue", server=server)
-    assert table.lines[0].startswith(f"rover 1: task {first} ")
-    assert "\x1b" not in table.output
-    assert all(line == line.rstrip() for line in table.lines)
-    assert table.lines[2].split()[:5] == ["id", "prio", "state", "label", "goal"]
-    assert "dock 3" in table.lines[4]
-    assert [line.split()[0] for line in table.lines[3:]] == [str(first), str(waiting["id"])]
-
-    shown = called("status", str(waiting["id"]), server=server)
-    assert "goal          move -2 m" in shown.lines
-    assert "label         dock 3" in shown.lines
-    assert "reason        start time" in shown.lines
-
-    assert called("cancel", "--json", server=server).objects == [
-        {"done": "cancel", "task": first, "vehicle": 1}
-    ]
-    (gone,) = called("status", str(first), "--json", server=server).objects
-    assert gone["state"] in ("cancelling", "cancelled")
-    # the first task may still be cancelling
-    assert called("clear", server=server).output.startswith("rover 1: all waiting tasks cancelled")
-    assert_one_line(called("cancel", str(waiting["id"]), server=server), 1, "has ended")
+    session(server, f"cancel --json{calling_off}")
 
 
 def test_finished_tasks_are_listed_newest_first(server: str, client: SyncClient) -> None:

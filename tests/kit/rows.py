@@ -1,9 +1,13 @@
-"""Requests as the rows of a text, each with its answer.
+"""Stories as the rows of a text: requests, each with its answer, and what has become of them.
 
 A row is a request, " : ", the result in its ack ("-": it gets none), and what is with it: words in
 the texts that come, and the number in the ack ("#1"), with " / " between them. A request is a
 command, a mission message, or a plan with its items; " & " joins some. "name> " before it is who
 sends it, if that is not the world's own client.
+
+Words are also those of ``facts``, 0.4 s after a request, or as soon as the waiting is over that a
+row ends with; "at=1,2,90" is the rover's true pose, in metres and degrees; "!" before words: they
+must not be there.
 """
 
 import re
@@ -13,11 +17,12 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
 from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.client import IDS, FakeClient
+from tests.kit.client import IDS, TASK_STATUS, FakeClient, TaskStatus
 from tests.kit.mission import Item, Upload, acks
-from tests.kit.world import World, at
+from tests.kit.world import World, at, near_pose
 
 PLACES = {
     "autopilot": (1, 1),
@@ -42,12 +47,16 @@ SHORT = {
     "LONG": "Failsafe" + "x" * 42,
     "LONGER": "Failsafe" + "x" * 41 + "y",
     "MANY_TEXTS": " & ".join(f"rover:statustext 6 x{n:049} {n % 40 + 1} 0" for n in range(80)),
+    "CONTINUE": "DO_PAUSE_CONTINUE 1",
     "EIGHT": "0,0,0,0,0,0,0,0",
     "BUSY": "TEMPORARILY_REJECTED",
     "IN": "NAV_FENCE_POLYGON_VERTEX_INCLUSION",
+    "SHOW": "REQUEST_MESSAGE 54000",
     "NOT_ALLOWED": "DENIED #108",
+    "PAUSE": "DO_PAUSE_CONTINUE 0",
     "POND": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION",
 }
+WAITS = ("wait", "until", "idle", "faster")
 PARAMETERS = IDS["PARAM_VALUE"], IDS["PARAM_ERROR"]
 
 
@@ -83,6 +92,13 @@ def ask(world: World, text: str, client: FakeClient | None = None) -> None:
     target = fields.pop("to", PLACES["server" if is_of_server else "autopilot"])
     if name == "wait":
         world.run(numbers[0])
+    elif name == "until":
+        task, state = numbers
+        world.until_state(task, TaskState[state.decode()], within=fields.get("within", 30))
+    elif name == "idle":
+        world.until_idle(tasks=numbers[0], within=fields.get("within", 60))
+    elif name == "faster":
+        world.until_faster(*numbers)
     elif name == "fault":
         world.fault(Faults(**fields))
     elif name == "lose":
@@ -93,6 +109,8 @@ def ask(world: World, text: str, client: FakeClient | None = None) -> None:
         world.suspend_server(numbers[0])
     elif name == "reboot":
         world.rover.autopilot.reboot(now=world.now)
+    elif name == "operator" and numbers[0] in (b"arms", b"disarms"):
+        world.operator_arm(numbers[0] == b"arms")
     elif name == "operator":
         world.operator_mode(Mode(numbers[0].decode()))
     elif name == "unread":
@@ -122,6 +140,29 @@ def number_of(name: str) -> int:
     return int(name if name.isdigit() else of_standard or MavCmd[name])
 
 
+def facts(world: World, since: float) -> list[str]:
+    """Return what is so now, and what has left for the rover since then, in words."""
+    if not world.server.engine.snapshot(now=world.now).vehicles:
+        return []
+    sent = dict.fromkeys(world.observer.sent_since(since))
+    return [
+        *(f"task {t.id}: {t.state.name} {t.reason.name}." for t in world.tasks()),
+        f"queue {world.paused().name}, mode {world.mode().value}, it is {world.control()}",
+        f"it is {'ARMED' if world.is_armed else 'DISARMED'}",
+        f"it {'STANDS' if world.stands() else 'MOVES'}",
+        f"it gets {' '.join(sent).lower() or 'nothing'}.",
+    ]
+
+
+def is_told(world: World, words: str, numbers: list[str], said: str) -> bool:
+    """Return whether words are among the numbers, the texts or the facts, or are the pose."""
+    if words.startswith("at="):
+        return near_pose(world.pose(), number(words[3:]))
+    if words.startswith("!"):
+        return not is_told(world, words[1:], numbers, said)
+    return words in (numbers if words[:1] == "#" else said)
+
+
 def check(world: World, table: str, **clients: FakeClient) -> None:
     """Send requests one by one, and compare the answers to each."""
     table = re.sub(r"\w+", lambda word: SHORT.get(word[0], word[0]), table)
@@ -132,11 +173,16 @@ def check(world: World, table: str, **clients: FakeClient) -> None:
         result, _, words = answer.partition(" ")
         who, _, request = request.rpartition("> ")
         client = clients.get(who, world.client)
-        packets = len(client.received)
+        packets, since = len(client.received), world.now
         texts, commands, plans = len(client.texts()), len(client.acks), len(acks(client))
-        for each in request.split(" & "):
-            ask(world, each, client)
-        world.run(0.4)
+        try:
+            for each in request.split(" & "):
+                ask(world, each, client)
+        except AssertionError as error:
+            error.add_note(f"in the row: {row.strip()}")
+            raise
+        if each.split()[0] not in WAITS:
+            world.run(0.4)
         got = [MavResult(ack.result).name for ack in client.acks[commands:]]
         got += [MavMissionResult(ack.result).name for ack in acks(client)[plans:]]
         ids = {(p.message_id, p.source[1]) for p in client.received[packets:]}
@@ -149,10 +195,14 @@ def check(world: World, table: str, **clients: FakeClient) -> None:
                 is_value = packet.message_id == PARAMETERS[0]
                 what = f"={each.param_value:g}" if is_value else f": error {each.error}"
                 named.append(each.param_id + what)
-        said = " | ".join(client.texts()[texts:] + named)
+            elif packet.message_id == TASK_STATUS:
+                it = TaskStatus.of(packet.payload[:132])  # it may repeat
+                why = f"{TaskState(it.state).name} {TaskReason(it.reason).name}"
+                named.append(f"status {it.task_id}: {why}")
+        said = " | ".join(client.texts()[texts:] + named + facts(world, since))
         numbers = [f"#{ack.result_param2}" for ack in client.acks[commands:]]
         numbers += [f"#{ack.opaque_id}" for ack in acks(client)[plans:]]
-        are_right = all(w in (numbers if w[:1] == "#" else said) for w in words.split(" / "))
+        are_right = all(is_told(world, each, numbers, said) for each in words.split(" / "))
         if "+".join(got) != result.strip("-") or not are_right:
-            wrong.append(f"{who} {request}: {got} {numbers} {client.texts()[texts:]}, not {answer}")
+            wrong.append(f"{who} {request}: {got} {numbers} {said} {world.pose()}, not {answer}")
     assert not wrong, "\n".join(wrong)

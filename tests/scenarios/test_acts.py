@@ -110,16 +110,18 @@ def test_after_a_crash_it_is_not_told_again_but_held(world: World, path: Path, h
     assert times_told(world) == (1 if how == SKIP else 2)
 
 
-@for_each("answers", [True, False])
-def test_a_pause_before_its_answer_keeps_what_is_known(world: World, *, answers: bool) -> None:
-    task = told_without_an_answer(world, NO_FAULTS if answers else UNANSWERED)
-    world.client.pause()
-    world.run(8.0)
-    world.fault(NO_FAULTS)
-    world.client.proceed()
-    world.run(5.0)
-    after = (S.COMPLETED, R.NONE) if answers else (S.HELD, R.OUTCOME_UNKNOWN)
-    assert world.state(task) == after
+@for_each("answers, after", [(True, "COMPLETED NONE"), (False, "HELD OUTCOME_UNKNOWN")])
+def test_a_pause_before_its_answer_keeps_what_is_known(
+    world: World, answers: bool, after: str
+) -> None:
+    told_without_an_answer(world, NO_FAULTS if answers else UNANSWERED)
+    check(
+        world,
+        f"""
+PAUSE & wait 8 & fault & wait 0 : ACCEPTED
+CONTINUE & wait 5 : ACCEPTED task 1: {after}
+""",
+    )
     assert times_told(world) == 1
 
 
@@ -136,16 +138,13 @@ def test_the_answer_counts_also_if_another_task_goes_first_meanwhile(make_world:
 
 
 def test_what_waits_to_be_told_is_not_told_once_it_is_cancelled(world: World) -> None:
+    """A client's own command goes first."""
     world.fault(UNANSWERED)
     world.client.pause()
     task = upload(world, TOLD)
-    world.client.proceed()
-    world.until_state(task, S.EXECUTING)
-    world.client.command(RELAY, 5, 1, target=(1, 1))  # a client's own, which goes first
+    check(world, "CONTINUE & until 1 EXECUTING & DO_SET_RELAY 5 1 to=autopilot & wait 0 : ACCEPTED")
     world.until(lambda: world.task(task).progress.done > 0.0, within=10.0)
-    world.client.command(54010, task)
-    world.run(12.0)
-    assert world.state(task)[0] is S.CANCELLED
+    check(world, "TASK_CANCEL 1 : ACCEPTED+BUSY\nwait 12 : - task 1: CANCELLED")
     assert times_told(world) == 1
 
 
@@ -157,10 +156,8 @@ def test_what_comes_before_it_in_a_plan_is_done_before_it(world: World) -> None:
 
 
 def test_a_stop_ends_it(world: World) -> None:
-    task = told_without_an_answer(world)
-    world.client.command(54003)
-    world.run(8.0)
-    assert world.state(task) == (S.KILLED, R.STOP)
+    told_without_an_answer(world)
+    check(world, "TASK_STOP & wait 8 : ACCEPTED task 1: KILLED STOP")
     assert times_told(world) == 1
 
 

@@ -10,12 +10,11 @@ from mav_tasks.shell.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.personas import Mode, Persona
 from tests.kit.cases import for_each
-from tests.kit.client import ARM, FAILED, MOVE, SET_MODE
+from tests.kit.client import ARM, FAILED, SET_MODE
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.rows import ask
+from tests.kit.rows import ask, check
 from tests.kit.volume import some
 from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, ways_of
 from tests.scenarios.conftest import MakeWorld
@@ -27,7 +26,6 @@ DIRECTIONS = [("ardupilot", "px4"), ("px4", "ardupilot")]
 COPTER = 2  # MAV_TYPE_QUADROTOR
 ROVER, ARDUPILOT, PX4 = 10, 3, 12
 DELAY = Conditions().delay
-RELEASE, REQUEST, VERSION = 54013, 512, 148
 LOITER = 17  # MAV_CMD_NAV_LOITER_UNLIM
 
 directions = for_each("old, new", DIRECTIONS)
@@ -103,71 +101,41 @@ class Swapped:
         assert moving == []
 
 
+RUNNING = """TASK_MOVE 9 & until 1 EXECUTING : ACCEPTED
+TASK_MOVE 8 & wait 2 : ACCEPTED"""
+
+
 def running(world: World) -> None:
-    world.client.move(9.0)
-    world.client.move(8.0)
-    world.until_state(1, S.EXECUTING)
-    world.run(2)
+    """Have a task drive, and another one wait."""
+    check(world, RUNNING)
 
 
-def lost(world: World) -> None:
-    """It would go on by itself."""
-    running(world)
-    world.fault(Faults(silent=True))
-    world.run(1.5)
-
-
-def paused(world: World) -> None:
-    running(world)
-    world.client.pause()
-    world.run(3)
-
-
-def held(world: World) -> None:
-    running(world)
-    world.rover.autopilot.reboot(now=world.now)
-    world.until_state(1, S.HELD)
-
-
-def waiting(world: World) -> None:
-    world.client.pause()
-    world.run(1)
-    world.client.move(9.0)
-    world.run(1)
-
-
-def scheduled(world: World) -> None:
-    world.client.command(MOVE, 9.0, 0, 0, 0, 0, 8.0)
-    world.run(1)
-
-
-def idle(world: World) -> None:
-    world.run(1)
-
-
-def stopped(world: World) -> None:
-    running(world)
-    world.client.stop()
-    world.run(3)
-
-
-STATES = [running, lost, paused, held, waiting, scheduled, idle, stopped]
-STOP, PAUSE, RESUME = "TASK_STOP", "DO_PAUSE_CONTINUE 0", "DO_PAUSE_CONTINUE 1"
-ARMING = "COMPONENT_ARM_DISARM 1 to=autopilot"
+#: what the first one is doing; lost: it would go on by itself
+STATES = {
+    "running": RUNNING,
+    "lost": f"{RUNNING}\nfault silent=1 & wait 1.5 : -",
+    "paused": f"{RUNNING}\nPAUSE & wait 3 : ACCEPTED",
+    "held": f"{RUNNING}\nreboot & until 1 HELD : -",
+    "waiting": "PAUSE & wait 1 : ACCEPTED\nTASK_MOVE 9 & wait 1 : ACCEPTED",
+    "scheduled": "TASK_MOVE 9 0 0 0 0 8 & wait 1 : ACCEPTED",
+    "idle": "wait 1 : -",
+    "stopped": f"{RUNNING}\nTASK_STOP & wait 3 : ACCEPTED",
+}
+STOP, RESUME = "TASK_STOP", "DO_PAUSE_CONTINUE 1"
+OTHERS = ("DO_PAUSE_CONTINUE 0", RESUME, "COMPONENT_ARM_DISARM 1 to=autopilot")
 #: each state with the words that mean most, and the other words where there is something to undo
-CASES = [(state, word) for state in STATES for word in ("", STOP)] + [
-    (state, word) for state in (running, waiting, stopped) for word in (PAUSE, RESUME, ARMING)
-]
+CASES = [(state, word) for state in STATES for word in ("", STOP)]
+CASES += [(state, word) for state in ("running", "waiting", "stopped") for word in OTHERS]
 
 
 @directions
 @for_each("state, word", some(CASES, *range(0, len(CASES), 3)))
 def test_nothing_of_the_old_ones_control_reaches_the_new_one(
-    make_world: MakeWorld, old: str, new: str, state: Callable[[World], None], word: str
+    make_world: MakeWorld, old: str, new: str, state: str, word: str
 ) -> None:
     """The word is read in the turn in which the new one is first heard."""
     world = make_world(persona=PERSONAS[old])
-    state(world)
+    check(world, STATES[state])
     was_stopped = world.paused() is R.STOPPED
     swapped = Swapped(
         world, PERSONAS[new], at_first_beat=(lambda: ask(world, word)) if word else lambda: None
@@ -180,7 +148,7 @@ def test_nothing_of_the_old_ones_control_reaches_the_new_one(
         assert world.paused() is R.STOPPED
     elif waits:
         assert world.paused() in (R.RESTARTED, R.TAKEOVER)
-    if word != STOP and state in (running, lost, paused, held):
+    if word != STOP and state in ("running", "lost", "paused", "held"):
         assert world.state(1) == (S.HELD, R.FRAME_RESET)
     notes = [note.text for note in world.events(VehicleNoted) if "another vehicle" in note.text]
     assert len(notes) == 1
@@ -212,20 +180,18 @@ def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
     world = make_world(persona=persona)
     running(world)
     forge(world, kind, forged)
-    world.run(5)
-    assert world.stands()
-    assert world.mode() is Mode.HOLD
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    assert world.state(2)[0] is S.QUEUED
+    check(world, "wait 5 : - it STANDS / mode hold / task 1: HELD FRAME_RESET / task 2: QUEUED")
     assert any("is another vehicle now" in text for text in notes_of(world))
     place = world.pose()
     world.run(20)
     assert world.pose() == place
-    world.client.command(RELEASE, 1, 1)
-    world.run(1)
-    world.client.proceed()
-    world.until_idle(tasks=2)
-    assert world.states() == [S.COMPLETED] * 2
+    check(
+        world,
+        """
+TASK_RELEASE 1 1 & wait 1 : ACCEPTED
+CONTINUE & idle 2 : ACCEPTED task 1: COMPLETED / task 2: COMPLETED
+""",
+    )
 
 
 @for_each("autopilot, words", [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})])
@@ -276,14 +242,10 @@ def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
 def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -> None:
     """A client asks for the version: nothing else shows that the rover was exchanged."""
     running(world)
-    world.client.pause()
-    world.run(10)
+    check(world, "PAUSE & wait 10 : ACCEPTED")
     world.replace_rover(switched_on=0.0)
-    world.run(2)
-    world.client.command(REQUEST, VERSION, target=(1, 1))
-    world.run(1)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    assert world.paused() is R.RESTARTED
+    told = "task 1: HELD FRAME_RESET / queue RESTARTED"
+    check(world, f"wait 2 : -\nREQUEST_MESSAGE 148 to=autopilot & wait 1 : - {told}")
     assert any("is another vehicle now" in text for text in notes_of(world))
 
 

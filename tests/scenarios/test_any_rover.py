@@ -65,16 +65,6 @@ def test_the_ack_and_the_status_say_which_rover_was_chosen(make_world: MakeWorld
     world.until_state(1, S.COMPLETED)
 
 
-def test_a_busy_rover_is_passed_over_for_a_free_one(make_world: MakeWorld) -> None:
-    world = make_world(rovers=3)
-    tasks = [submit(world, 4.0, nonce=number).task_id for number in (1, 2, 3, 4)]
-    assert [rover_of(world, task) for task in tasks] == [1, 2, 3, 1]
-    (*_, last) = world.events(TaskAssigned)
-    assert (last.vehicle, last.before, last.task_id) == (1, 0, tasks[3])
-    assert last.choice.startswith("free in ")
-    assert "rover 2: begins in" in last.choice
-
-
 def test_the_nearest_free_rover_goes_to_a_place(make_world: MakeWorld) -> None:
     world = make_world(rovers=3)  # at 0, 3 and 6 m east
     upload = go_to(world, 0.0, 5.0)

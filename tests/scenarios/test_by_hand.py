@@ -8,20 +8,16 @@ from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
-    FAILED,
     GUIDED,
-    SET_INTERVAL,
     setpoint,
 )
+from tests.kit.rows import ask, check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-
-CANCEL, CLEAR = 54010, 54011
 
 
 def driving(world: World, distance: float = 20.0) -> World:
@@ -36,23 +32,20 @@ def taken_by_hand(world: World) -> None:
     world.rover.autopilot.operator_sticks(0.5, 0.2)
 
 
-@for_each("how", ["cancel", "clear", "cancel before"])
-def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, how: str) -> None:
+@for_each(
+    "first, then", [("wait 0", "TASK_CANCEL 1"), ("wait 0", "TASK_CLEAR 1"), ("TASK_CANCEL 1", "")]
+)
+def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, first: str, then: str) -> None:
     driving(world)
-    if how == "cancel before":
-        world.client.command(CANCEL, 1)
-        world.run(0.1)
+    ask(world, first)
+    world.run(0.1)
     taken_by_hand(world)
     world.run(2)
     at = world.now
-    if how == "cancel":
-        world.client.command(CANCEL, 1)
-    elif how == "clear":
-        world.client.command(CLEAR, 1)
-    world.run(8)
-    assert world.state(1)[0] is S.CANCELLED
+    if then:
+        ask(world, then)
+    check(world, f"wait 8 : {'ACCEPTED' if then else '-'} task 1: CANCELLED / mode manual")
     assert world.observer.sent_since(at) == []
-    assert world.mode() is Mode.MANUAL
 
 
 def driven_by_a_client(world: World) -> World:
@@ -69,9 +62,7 @@ def driven_by_a_client(world: World) -> World:
 def test_a_pause_stops_a_rover_that_a_client_drives(world: World) -> None:
     driven_by_a_client(world)
     world.client.end_streams()
-    sent = world.add_client("other").pause()
-    world.run(3)
-    assert (sent.result, world.stands()) == (ACCEPTED, True)
+    check(world, "other> PAUSE & wait 3 : ACCEPTED it STANDS", other=world.add_client("other"))
 
 
 def test_a_disarm_is_not_undone_by_an_arming_that_waited(make_world: MakeWorld) -> None:
@@ -119,19 +110,13 @@ def test_a_position_that_is_none_is_passed_over(world: World, value: float) -> N
 
 def test_nobody_takes_the_position_away_from_a_task(world: World) -> None:
     driving(world)
-    world.client.command(SET_INTERVAL, 32, -1, target=(1, 50))
-    world.run(3)
-    assert world.state(1)[0] is S.EXECUTING
+    check(world, "SET_MESSAGE_INTERVAL 32 -1 to=1,50 & wait 3 : ACCEPTED task 1: EXECUTING")
 
 
 def test_a_pause_that_the_rover_cannot_hear_says_so_and_counts(world: World) -> None:
     driving(world)
-    world.fault(Faults(silent=True, deaf=True))
-    world.run(4)
-    sent = world.client.pause()
-    world.run(1)
-    assert sent.answer == (FAILED, R.VEHICLE_SILENT)
-    assert world.paused() is R.OPERATOR
+    silent = f"PAUSE & wait 1 : FAILED #{R.VEHICLE_SILENT} / queue OPERATOR"
+    check(world, f"fault silent=1 deaf=1 & wait 4 : -\n{silent}")
 
 
 def test_a_takeover_by_a_stations_sticks_names_the_station(world: World) -> None:

@@ -10,10 +10,10 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DRIVE, MOVE, TEMPORARILY_REJECTED
+from tests.kit.rows import check
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -33,17 +33,14 @@ def driving(world: World) -> World:
 @for_each("task", [0, 1])
 def test_the_running_task_is_cancelled_once_the_rover_stands(world: World, task: int) -> None:
     driving(world)
-    at = world.now
-    sent = world.client.command(CANCEL, task)
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 1)
-    assert world.state(1) == (S.CANCELLING, R.CANCELLED)
-    assert world.observer.sent_since(at + 0.01)[0] == "zero"
-    world.until_state(1, S.CANCELLED, within=4)
-    assert world.stands()
-    world.until_idle(tasks=3)
-    assert world.states() == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
-    assert world.client.statuses(1)[-1].why == (S.CANCELLED, R.CANCELLED)
+    check(
+        world,
+        f"""
+TASK_CANCEL {task} : ACCEPTED #1 / task 1: CANCELLING CANCELLED / it gets zero
+until 1 CANCELLED within=4 : - it STANDS / status 1: CANCELLED CANCELLED
+idle 3 : - task 1: CANCELLED / task 2: COMPLETED / task 3: COMPLETED
+""",
+    )
 
 
 @for_each("repeats_after", [0.5, 3.0])  # s; QGroundControl repeats after 3
@@ -73,40 +70,42 @@ def test_a_kill_is_zero_and_hold_at_once_and_no_latch(world: World) -> None:
 
 
 def test_a_rover_that_does_not_stop_leaves_the_task_held_and_is_told_on(world: World) -> None:
-    driving(world)
-    world.fault(Faults(withheld=frozenset({32})))  # no position: nobody can see it stand
-    world.client.command(CANCEL, 1)
-    world.run(5.5)
-    assert world.state(1) == (S.HELD, R.STOP_UNCONFIRMED)
-    world.run(1)
-    assert world.state(2)[0] is S.QUEUED
-    assert "HOLD" in world.observer.sent_since(world.now - 0.9)
-    world.fault(Faults())
-    world.until(lambda: world.stands() and world.mode() is Mode.HOLD, within=5)
-    world.run(1)
-    assert world.state(1) == (S.HELD, R.STOP_UNCONFIRMED)
+    driving(world)  # without a position nobody can see it stand
+    check(
+        world,
+        """
+fault withheld=32,32 & TASK_CANCEL 1 : ACCEPTED
+wait 5.1 : - task 1: HELD STOP_UNCONFIRMED
+wait 0.5 : - task 2: QUEUED / it gets zero hold
+fault & wait 5 : - it STANDS / mode hold
+wait 0.6 : - task 1: HELD STOP_UNCONFIRMED
+""",
+    )
 
 
 def test_waiting_tasks_are_cancelled_or_killed_at_once(world: World) -> None:
     driving(world)
-    world.client.command(CANCEL, 2)
-    world.run(0.6)
-    world.client.command(CANCEL, 3, 1)
-    world.run(0.1)
-    assert world.state(2) == (S.CANCELLED, R.CANCELLED)
-    assert world.state(3) == (S.KILLED, R.CANCELLED)
-    assert world.state(1)[0] is S.EXECUTING
+    check(
+        world,
+        """
+TASK_CANCEL 2 : ACCEPTED #2
+wait 0.2 : -
+TASK_CANCEL 3 1 : ACCEPTED task 2: CANCELLED CANCELLED / \
+task 3: KILLED CANCELLED / task 1: EXECUTING
+""",
+    )
 
 
-@for_each("scope", [0, 1])
-def test_clear_takes_what_waits_or_everything(world: World, scope: int) -> None:
+@for_each("scope, becomes", [(0, "COMPLETED"), (1, "CANCELLED")])
+def test_clear_takes_what_waits_or_everything(world: World, scope: int, becomes: str) -> None:
     driving(world)
-    sent = world.client.command(CLEAR, scope)
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 0)
-    assert [world.state(i) for i in (2, 3)] == [(S.CANCELLED, R.CLEARED)] * 2
-    world.until_idle(tasks=3)
-    assert world.state(1)[0] is (S.CANCELLED if scope else S.COMPLETED)
+    check(
+        world,
+        f"""
+TASK_CLEAR {scope} : ACCEPTED #0 / task 2: CANCELLED CLEARED / task 3: CANCELLED CLEARED
+idle 3 : - task 1: {becomes}
+""",
+    )
 
 
 def test_command_cancel_takes_the_askers_latest_of_that_command(world: World) -> None:

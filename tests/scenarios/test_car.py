@@ -18,7 +18,7 @@ from tests.kit.car import Car
 from tests.kit.cases import anew, for_each
 from tests.kit.client import DENIED
 from tests.kit.px4 import PROMPT_PX4, go_to
-from tests.kit.world import PROMPT, World, near_pose
+from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_profiles import ARDUPILOT_PROFILE, PX4_PROFILE
 
@@ -43,10 +43,6 @@ def make_car(make_world: MakeWorld) -> Drive:
     return make
 
 
-def is_at(world: World, north: float, east: float) -> bool:
-    return near_pose(world.pose(), (north, east, 0.0), angle=180)
-
-
 def test_who_names_a_heading_reads_that_it_is_left_out(make_car: Drive) -> None:
     world = make_car(PROMPT)
     words = "rover 1 steers like a car: the final heading is ignored"
@@ -66,12 +62,6 @@ class TestOneOfWhichNobodyHasAProfile:
         outputs = (Parameter("SERVO1_FUNCTION", 26, INT16), Parameter("SERVO3_FUNCTION", 70, INT16))
         car = replace(PROMPT, parameters=(*PROMPT.parameters, *outputs))
         return make_world(persona=car, body=partial(Car, radius=RADIUS))
-
-    def test_a_go_to_is_driven_all_the_same(self, world: World) -> None:
-        go_to(world, -3.0, 4.0)
-        world.until_idle(tasks=1, within=90)
-        assert world.state(1)[0] is S.COMPLETED
-        assert is_at(world, -3.0, 4.0)
 
     def test_a_turn_on_the_spot_is_refused(self, world: World) -> None:
         sent = world.client.rotate(90)

@@ -1,19 +1,12 @@
 """What clients may do to a rover besides giving it tasks: commands that move, modes, arming."""
 
-from math import nan
-
-import pytest
-
 from mav_tasks.config.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, GUIDED, HOLD, setpoint
-from tests.kit.world import World, at
+from tests.kit.client import GUIDED, HOLD, setpoint
+from tests.kit.rows import check
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-
-GLOBAL = 0  # MAV_FRAME
-REPOSITION = 192
 
 
 def takes_control(world: World) -> None:
@@ -44,18 +37,17 @@ def test_our_mode_asked_for_right_after_hold_is_not_undone(
 def test_a_stop_ends_what_clients_were_granted(world: World) -> None:
     takes_control(world)
     world.client.stream(setpoint(0.5), rate=20)
-    world.run(1)
-    assert not world.stands()
-    world.client.stop()
-    world.run(3)
-    world.client.proceed()
-    world.run(0.5)
-    other = world.add_client("other")
-    other.mode(GUIDED)
-    world.run(0.5)
-    other.arm(True)
-    world.run(2)
-    assert (world.is_armed, world.stands()) == (True, True)
+    check(
+        world,
+        """
+wait 1 : - it MOVES
+TASK_STOP & wait 3 : ACCEPTED
+CONTINUE : ACCEPTED
+other> DO_SET_MODE 1 15 to=autopilot & wait 0.5 : ACCEPTED
+other> ARM 1 & wait 2 : ACCEPTED it is ARMED / it STANDS
+""",
+        other=world.add_client("other"),
+    )
 
 
 def test_what_a_client_said_while_the_server_stood_still_moves_no_rover(world: World) -> None:
@@ -91,23 +83,11 @@ def test_that_a_rover_is_to_stand_is_passed_on_however_late(world: World) -> Non
     assert world.stands()  # its own time-out would be later
 
 
-class TestUnclaimed:
+def test_unclaimed_a_go_to_is_the_rovers_own_once_it_is_armed(make_world: MakeWorld) -> None:
     """The setting ``claim`` is off: what goes to the autopilot is the client's own business."""
-
-    @pytest.fixture
-    def world(self, make_world: MakeWorld) -> World:
-        return make_world(settings=Settings(claim=False))
-
-    def go_to(self, world: World, flags: int = 1) -> tuple[int, int] | None:
-        sent = world.client.command_int(
-            REPOSITION, -1, flags, 0, nan, **at(1, 0), frame=GLOBAL, target=(1, 1)
-        )
-        world.run(0.5)
-        return sent.answer
-
-    def test_a_go_to_is_the_rovers_own_once_it_is_armed(self, world: World) -> None:
-        assert self.go_to(world) == (DENIED, R.NOT_ALLOWED)
-        assert world.client.said("the rover is not armed")
-        takes_control(world)
-        assert self.go_to(world) == (ACCEPTED, 0)
-        assert world.tasks() == ()
+    world = make_world(settings=Settings(claim=False))
+    go = "DO_REPOSITION -1 1 0 nan at=1,0 frame=0 to=autopilot"
+    check(world, f"{go} : NOT_ALLOWED / the rover is not armed")
+    takes_control(world)
+    check(world, f"{go} : ACCEPTED #0")
+    assert world.tasks() == ()

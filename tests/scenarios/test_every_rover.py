@@ -15,13 +15,11 @@ from tests.kit.client import (
     MOVE,
     PAUSE_CONTINUE,
     REPEATS,
-    REQUEST,
     SET_MODE,
     FakeClient,
 )
 from tests.kit.fleet import Fleet
-from tests.kit.px4 import HOLD as PX4_HOLD
-from tests.kit.px4 import ask_mode
+from tests.kit.rows import check
 from tests.scenarios.conftest import MakeWorld
 
 ALL = (0, 0)
@@ -73,18 +71,17 @@ def test_hold_and_a_pause_reach_every_rover(fleet: Fleet, component: int) -> Non
     assert len(answers(fleet.other, PAUSE_CONTINUE)) == 4
 
 
-@for_each("persona", [ARDUPILOT, PX4])
-def test_modes_and_capabilities_are_answered(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    if persona is PX4:
-        hold = ask_mode(world.client, PX4_HOLD, target=ALL)
-    else:
-        hold = world.client.mode(HOLD, target=ALL)
-    asked = world.client.command(REQUEST, AUTOPILOT_VERSION, target=ALL)
-    world.run(0.5)
-    assert (hold.result, asked.result) == (ACCEPTED, ACCEPTED)
-    assert world.client.heard("AUTOPILOT_VERSION")
-    assert {ack for ack, _ in answers(world.client, REQUEST)} == {(1, 1)}
+@for_each("persona, hold", [(ARDUPILOT, "4"), (PX4, "4 3")])
+def test_modes_and_capabilities_are_answered(
+    make_world: MakeWorld, persona: Persona, hold: str
+) -> None:
+    check(
+        make_world(persona=persona),
+        f"""
+DO_SET_MODE 1 {hold} to=all : ACCEPTED
+REQUEST_MESSAGE 148 to=all : ACCEPTED AUTOPILOT_VERSION@1 / COMMAND_ACK@1
+""",
+    )
 
 
 def test_a_task_command_must_name_its_rover_and_is_told_so_once(fleet: Fleet) -> None:

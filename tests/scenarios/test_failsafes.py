@@ -7,10 +7,12 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, PX4, Persona
 from tests.kit.cases import anew, for_each
+from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 OUTSIDE = Faults(outside_fence=True)
+OUTSIDE_WORDS = "Task 1 waits: outside its own fence; drive it back by hand"
 
 
 def driving_world(make_world: MakeWorld, persona: Persona) -> World:
@@ -62,14 +64,12 @@ class TestOwnFence:
     def test_a_task_that_comes_while_it_is_outside_waits_and_says_why(
         self, make_world: MakeWorld
     ) -> None:
-        world = make_world(persona=ARDUPILOT)
-        world.fault(OUTSIDE)
-        world.run(3)
-        world.client.move(2)
-        world.run(3)
-        status = world.shown(1)
-        assert (status.state, status.reason) == (S.QUEUED, R.OUTSIDE_OWN_FENCE)
-        words = "Task 1 waits: outside its own fence; drive it back by hand"
-        assert words in world.client.texts()
-        world.fault(Faults())
-        world.until_state(1, S.COMPLETED, within=40)
+        check(
+            make_world(persona=ARDUPILOT),
+            f"""
+    fault outside_fence=1 & wait 3 : -
+    TASK_MOVE 2 & wait 3 : ACCEPTED {OUTSIDE_WORDS}
+    SHOW 1 : ACCEPTED status 1: QUEUED OUTSIDE_OWN_FENCE
+    fault & until 1 COMPLETED within=40 : -
+    """,
+        )

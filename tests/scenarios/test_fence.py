@@ -9,7 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL
-from tests.kit.mission import Download, Item, Upload, currents
+from tests.kit.mission import Download, Item, Upload
 from tests.kit.rows import check
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
@@ -47,15 +47,6 @@ def go_to(world: World, north: float, east: float) -> tuple[int, int] | None:
 
 def place(north: float, east: float) -> Item:
     return Item(WAYPOINT, **at(north, east))
-
-
-def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
-    fenced(world, *YARD, *POND)
-    download = Download(world.client, kind=FENCE)
-    world.until(lambda: download.is_done, within=5)
-    world.run(1.1)
-    assert (len(download.items), download.opaque_id > 0) == (8, True)
-    assert currents(world.client)[-1].fence_id == download.opaque_id
 
 
 def test_a_fence_that_is_none_is_refused_and_the_one_before_stays(world: World) -> None:
@@ -96,23 +87,26 @@ def test_an_item_outside_or_behind_an_exclusion_is_refused_as_it_comes(world: Wo
 
 def test_a_move_that_would_leave_it_fails_before_it_begins(world: World) -> None:
     fenced(world, *YARD)
-    world.client.move(5)
-    world.client.move(1)
-    world.until_idle(tasks=2)
-    assert world.state(1) == (S.FAILED, R.OUTSIDE_FENCE)
-    assert world.client.said("would leave the fence in task 1 after 3.0 m")
-    assert world.state(2)[0] is S.COMPLETED
+    check(
+        world,
+        """
+TASK_MOVE 5 : ACCEPTED would leave the fence in task 1 after 3.0 m
+TASK_MOVE 1 & idle 2 : ACCEPTED task 1: FAILED OUTSIDE_FENCE / task 2: COMPLETED
+""",
+    )
 
 
 @for_each("speed", [0.5, 2.0, -2.0])
 def test_what_has_no_end_is_stopped_before_the_boundary(world: World, speed: float) -> None:
     fenced(world, *YARD)
-    world.client.command(DRIVE, speed, 0, 30, 0, 0, 0, 5)
-    world.until_state(1, S.HELD)
-    world.run(3)
-    assert world.state(1) == (S.HELD, R.FENCE)
+    check(
+        world,
+        f"""
+TASK_DRIVE {speed} 0 30 & until 1 HELD : ACCEPTED
+wait 3 : - task 1: HELD FENCE / it STANDS
+""",
+    )
     assert 2.3 < abs(world.truth.north) < 3.0
-    assert world.stands()
 
 
 @for_each("fresh", [0.3, 1.0])
@@ -134,22 +128,16 @@ def test_a_rover_that_falls_silent_before_the_boundary_stops_before_it(
 
 
 def test_a_way_that_a_new_fence_forbids_is_stopped(world: World) -> None:
-    world.client.move(20)
-    world.until_state(1, S.EXECUTING)
-    world.run(2)
+    check(world, "TASK_MOVE 20 & until 1 EXECUTING : ACCEPTED\nwait 2 : -")
     fenced(world, *YARD)
-    world.until_state(1, S.HELD)
-    world.run(3)
-    assert world.state(1) == (S.HELD, R.FENCE)
+    check(world, "until 1 HELD & wait 3 : - task 1: HELD FENCE")
     assert world.truth.north < 3.0
 
 
 def test_a_rover_outside_may_come_back_in(world: World) -> None:
-    world.client.move(4)
-    world.until_idle(tasks=1)
+    check(world, "TASK_MOVE 4 & idle 1 : ACCEPTED")
     fenced(world, *YARD)
-    assert go_to(world, 1, 0) == (ACCEPTED, 2)
-    world.until_state(2, S.COMPLETED)
+    check(world, "DO_REPOSITION -1 at=1,0 frame=0 & until 2 COMPLETED : ACCEPTED #2")
     assert is_at(world, 1, 0)
 
 

@@ -1,94 +1,64 @@
 """MAVSDK sends a PX4 rover HOLD before each "go to": what was running goes on all the same."""
 
-from math import nan
-
-from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, set_mode
-from tests.kit.px4 import HOLD, PROMPT_PX4, REPOSITION, ask_mode, go_to
-from tests.kit.world import World, at
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.rows import check
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
+
+GO = "DO_REPOSITION -1 1 0 nan at=5,5 frame=6 to=autopilot"
 
 
 @anew
 def world(make_world: MakeWorld) -> World:
-    return make_world(persona=PROMPT_PX4)
-
-
-def driving(world: World) -> World:
-    """Have a task drive."""
-    world.client.move(20, speed=0.5)
-    world.until_faster(0.45)
+    """A PX4 that a task drives, after another client was heard."""
+    world = make_world(persona=PROMPT_PX4)
+    check(world, "TASK_MOVE 20 0.5 & faster 0.45 : ACCEPTED")
     return world
 
 
-class TestAHoldBeforeAGoTo:
-    def test_stands_at_once_and_changes_the_mode_after_a_second(self, world: World) -> None:
-        asked_at = driving(world).now
-        sent = ask_mode(world.client, HOLD)
-        world.run(0.1)
-        assert sent.answer == (ACCEPTED, 1)
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-        world.run(0.8)
-        assert set(world.observer.sent_since(asked_at)) == {"zero"}
-        modes = [world.mode()]
-        world.run(1.5)
-        modes.append(world.mode())
-        assert modes == [Mode.GUIDED, Mode.HOLD]
-        assert world.stands()
+def test_a_hold_stands_at_once_and_changes_the_mode_after_a_second(world: World) -> None:
+    check(
+        world,
+        """
+HOLD & wait 0.1 : ACCEPTED #1 / task 1: PAUSED OPERATOR / it gets zero.
+wait 0.8 : - it gets zero. / mode guided
+wait 1.5 : - mode hold / it STANDS
+""",
+    )
 
-    @for_each("ask", ["DO_SET_MODE", "SET_MODE", "twice"])
-    def test_is_undone_by_it_and_the_mode_is_never_changed(self, world: World, ask: str) -> None:
-        asked_at = driving(world).now
-        if ask == "SET_MODE":
-            world.client.send(set_mode(HOLD))
-        else:
-            ask_mode(world.client, HOLD)
-        if ask == "twice":
-            world.run(0.5)
-            ask_mode(world.client, HOLD)
-        world.run(0.03)
-        assert "zero" in world.observer.sent_since(asked_at)
-        assert world.paused() is R.OPERATOR
-        assert go_to(world, 5.0, 5.0) == 2
-        assert world.paused() is R.NONE
-        world.run(3)
-        assert world.state(1)[0] is S.EXECUTING
-        assert world.truth.forward_speed > 0.4
-        assert "HOLD" not in world.observer.sent_since(asked_at)
 
-    def test_too_late_undoes_nothing(self, world: World) -> None:
-        driving(world)
-        ask_mode(world.client, HOLD)
-        world.run(1.1)
-        go_to(world, 5.0, 5.0)
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-        assert world.paused() is R.OPERATOR
+HOLDS = """HOLD & wait 0.03 : ACCEPTED it gets zero. / queue OPERATOR
+client:set_mode 1 1 50593792 & wait 0.03 : - it gets zero. / queue OPERATOR
+HOLD & wait 0.5 & HOLD & wait 0.03 : ACCEPTED+ACCEPTED it gets zero. / queue OPERATOR"""
 
-    @for_each("order", [(0, 1), (1, 0)])
-    @for_each("wish", ["stop", "pause", "hold of another"])
-    def test_undoes_only_the_pause_of_its_own_hold(
-        self, world: World, wish: str, order: tuple[int, int]
-    ) -> None:
-        other = world.add_client("other")
-        world.run(1.5)
-        driving(world)
-        wishes = {
-            "stop": other.stop,
-            "pause": other.pause,
-            "hold of another": lambda: ask_mode(other, HOLD),
-        }
-        both_wishes = (wishes[wish], lambda: ask_mode(world.client, HOLD))
-        for number in order:
-            both_wishes[number]()
-            world.run(0.1)
-        sent = world.client.command_int(
-            REPOSITION, -1, 1, 0, nan, **at(5, 5), frame=6, target=(1, 1)
-        )
-        world.run(3)
-        assert sent.ack is not None
-        assert world.paused() is (R.STOPPED if wish == "stop" else R.OPERATOR)
-        assert world.stands()
-        assert world.mode() is Mode.HOLD
+
+@for_each("hold", HOLDS.splitlines())
+def test_it_is_undone_by_a_go_to_and_the_mode_is_never_changed(world: World, hold: str) -> None:
+    check(
+        world,
+        f"""
+{hold}
+{GO} : ACCEPTED #2 / queue NONE / ! hold
+wait 3 : - task 1: EXECUTING / it MOVES / ! hold
+""",
+    )
+
+
+def test_too_late_undoes_nothing(world: World) -> None:
+    check(
+        world,
+        f"HOLD & wait 1.1 : ACCEPTED\n{GO} : ACCEPTED task 1: PAUSED OPERATOR / queue OPERATOR",
+    )
+
+
+@for_each("order", ["{0} & wait 0.1 & HOLD", "HOLD & wait 0.1 & {0}"])
+@for_each("wish, queue", [("TASK_STOP", "STOPPED"), ("PAUSE", "OPERATOR"), ("HOLD", "OPERATOR")])
+def test_undoes_only_the_pause_of_its_own_hold(
+    world: World, wish: str, queue: str, order: str
+) -> None:
+    other = world.add_client("other")
+    world.run(1.5)
+    for row in order.format(f"other> {wish}").split(" & wait 0.1 & "):
+        check(world, f"{row} & wait 0.1 : ACCEPTED", other=other)
+    check(world, f"{GO} & wait 3 : ACCEPTED queue {queue} / it STANDS / mode hold")

@@ -8,11 +8,9 @@ from mav_tasks.engine.inputs import KeysChanged, PeerChanged, SettingsChanged
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.cases import for_each
 from tests.kit.client import (
-    ACCEPTED,
     AUTO,
     DENIED,
     GUIDED,
@@ -25,7 +23,7 @@ from tests.kit.client import (
 from tests.kit.mission import Item
 from tests.kit.px4 import MISSION, PROMPT_PX4
 from tests.kit.restarts import UTC
-from tests.kit.rows import parsed
+from tests.kit.rows import check, parsed
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_roles import (
@@ -106,15 +104,18 @@ def test_a_plan_that_is_started_again_keeps_to_the_limits_of_who_starts_it(
 def test_only_an_operator_s_stop_clears_the_queue(with_roles: MakeRoles) -> None:
     """Everybody stops a rover; but the tasks of others are theirs."""
     world = with_roles()
-    observer, operator = join(world, OBSERVER), join(world, OPERATOR)
-    task = active(world, 20.0)
-    waiting = world.client.move(1.0)
-    assert answer(world, observer.stop(clear=True)) == (ACCEPTED, task)
-    assert world.paused() is R.STOPPED
-    assert world.state(waiting.task_id)[0] is S.QUEUED
-    assert "stopped, but role observer may not clear a queue; operator may" in observer.texts()
-    assert answer(world, operator.stop(clear=True)) == (ACCEPTED, 0)
-    assert world.state(waiting.task_id)[0] is S.CANCELLED
+    active(world, 20.0)
+    check(
+        world,
+        """
+TASK_MOVE 1 : ACCEPTED #2
+observer> TASK_STOP 1 : ACCEPTED #1 / queue STOPPED / task 2: QUEUED / stopped, but role observer \
+may not clear a queue; operator may
+operator> TASK_STOP 1 : ACCEPTED #0 / task 2: CANCELLED
+""",
+        observer=join(world, OBSERVER),
+        operator=join(world, OPERATOR),
+    )
 
 
 #: a fence's item, no fence, nothing at all, an old fence, an old rally point, a device
@@ -147,9 +148,8 @@ def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
 
 def test_switching_the_fence_off_as_a_switch_does_is_of_safety(with_roles: MakeRoles) -> None:
     world = with_roles()
-    operator = join(world, OPERATOR)
-    fence = operator.command(218, 11, 0, target=(1, 1))  # DO_AUX_FUNCTION
-    assert answer(world, fence) == (DENIED, R.NOT_ALLOWED)
+    switch = "operator> 218 11 0 to=autopilot : NOT_ALLOWED"
+    check(world, switch, operator=join(world, OPERATOR))
 
 
 def test_what_a_revoked_key_drives_stands(world: World) -> None:

@@ -12,32 +12,25 @@ from mav_tasks.mavlink.signing import Key
 from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.geo import DEFAULT_ORIGIN
 from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
     GUIDED,
-    RTL,
     FakeClient,
     Sent,
     setpoint,
     sticks,
 )
-from tests.kit.mission import Item, Upload
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import ask, check
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import World, at, put_home
+from tests.kit.world import World, put_home
 from tests.scenarios.conftest import MakeWorld
 
-WAYPOINT, OPTIONS, SPEED, RETURN = 16, 54014, 178, 20
-REPOSITION, MODIFY, CANCEL = 192, 54012, 54010
-PRIORITY = 1  # TASK_MODIFY, param2
 BOSS = Key("boss", bytes(range(32)), "operator")
 SECRET = bytes(range(1, 33))
 NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
-MISSION_ACCEPTED = 0
 
 
 def agents(limits: Limits | None = None, *, role: str = "submitter", secret: bytes = SECRET) -> Key:
@@ -83,20 +76,6 @@ def answer(world: World, sent: Sent) -> tuple[int, int] | None:
     return sent.answer
 
 
-def uploaded(world: World, client: FakeClient, *items: Item) -> Upload:
-    return world.upload(items, target=(1, 191), client=client)
-
-
-def places(*norths: float) -> list[Item]:
-    found = (DEFAULT_ORIGIN.to_global(north, 0.0) for north in norths)
-    return [Item(WAYPOINT, x, y, param1=0.01, param4=0.0) for x, y in found]
-
-
-def of_ours(command: int, *params: float) -> Item:
-    p1, p2, p3, p4 = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
-    return Item(command, 0, 0, p1, p2, p3, p4, frame=2)
-
-
 def way(world: World, tasks: int) -> tuple[float, float]:
     """Run until the tasks are over; return the true way of the rover, and its top speed."""
     metres, fastest, before = 0.0, 0.0, world.pose()
@@ -132,20 +111,20 @@ plan; DO_CHANGE_SPEED 1 0.2 0 0 frame=2; GO 0.01 0 0 0 at=1,0 & wait 1.2 : DENIE
 def test_the_tighter_limit_counts_and_an_operators_key_has_limits_too(
     world: World, limited: Callable[..., FakeClient]
 ) -> None:
-    agent = limited("operator", max_speed=0.1, max_priority=6)
-    assert answer(world, agent.move(1.0, speed=0.2)) == NOT_ALLOWED
-    assert answer(world, agent.command(SPEED, 1, 0.2)) == (DENIED, R.BAD_PARAMETER)
-    assert answer(world, agent.move(1.0, priority=7)) == NOT_ALLOWED
-    assert answer(world, agent.move(5.0, priority=6)) == (ACCEPTED, 1)
-    assert answer(world, agent.command(MODIFY, 1, PRIORITY, 7)) == NOT_ALLOWED
+    world.client = limited("operator", max_speed=0.1, max_priority=6)
+    check(
+        world,
+        f"""
+TASK_MOVE 1 0.2 0 0 0 0 5 : NOT_ALLOWED
+DO_CHANGE_SPEED 1 0.2 : DENIED #{R.BAD_PARAMETER}
+TASK_MOVE 1 0 0 0 0 0 7 : NOT_ALLOWED
+TASK_MOVE 5 0 0 0 0 0 6 : ACCEPTED #1
+TASK_MODIFY 1 1 7 : NOT_ALLOWED
+""",
+    )
 
 
 # distance
-
-
-def go_to(world: World, agent: FakeClient, north: float) -> None:
-    agent.command_int(REPOSITION, -1, 0, target=(1, 1), frame=6, **at(north, 0))
-    world.run(0.3)
 
 
 #: from 0, 0, heading north; within 3 m
@@ -198,43 +177,49 @@ def test_a_return_is_as_long_as_the_way_home(
     world: World, limited: Callable[..., FakeClient]
 ) -> None:
     put_home(world, 0.0, 0.0)
-    agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
-    boss.move(4.0)
-    world.run(0.3)
-    way(world, 1)
-    assert answer(world, agent.mode(RTL)) == NOT_ALLOWED
-    assert answer(world, agent.command(RETURN, target=(1, 1))) == NOT_ALLOWED
-    boss.move(-2.0)
-    world.run(0.3)
-    way(world, 2)
-    assert answer(world, agent.command(RETURN, target=(1, 1))) == (ACCEPTED, 3)
+    world.client = limited(max_distance=3.0)
+    check(
+        world,
+        """
+boss> TASK_MOVE 4 & idle 1 : ACCEPTED
+DO_SET_MODE 1 11 to=autopilot : NOT_ALLOWED
+NAV_RETURN_TO_LAUNCH to=autopilot : NOT_ALLOWED
+boss> TASK_MOVE -2 & idle 2 : ACCEPTED
+NAV_RETURN_TO_LAUNCH to=autopilot : ACCEPTED #3
+""",
+        boss=signing(world, BOSS, name="boss"),
+    )
 
 
 def test_a_way_begins_where_the_tasks_before_it_end(
     world: World, limited: Callable[..., FakeClient]
 ) -> None:
-    agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
-    assert answer(world, boss.move(6.0)) == (ACCEPTED, 1)
-    go_to(world, agent, 1.0)
-    assert len(world.tasks()) == 1  # 5 m back, by its turn
-    go_to(world, agent, 8.0)
-    way(world, 2)
-    assert world.state(2)[0] is S.COMPLETED
+    world.client = limited(max_distance=3.0)  # the first would be 5 m back, by its turn
+    check(
+        world,
+        """
+boss> TASK_MOVE 6 : ACCEPTED #1
+DO_REPOSITION -1 0 to=autopilot frame=6 at=1,0 : NOT_ALLOWED
+DO_REPOSITION -1 0 to=autopilot frame=6 at=8,0 & idle 2 : ACCEPTED #2 / task 2: COMPLETED
+""",
+        boss=signing(world, BOSS, name="boss"),
+    )
     assert world.pose()[0] == pytest.approx(8.0, abs=0.1)
 
 
 def test_a_task_that_would_begin_too_far_away_fails_where_the_rover_stands(
     world: World, limited: Callable[..., FakeClient]
 ) -> None:
-    agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
-    upload = uploaded(world, agent, *places(2.0), of_ours(OPTIONS, 5, 20))
-    assert (upload.result, world.state(1)[0]) == (MISSION_ACCEPTED, S.SCHEDULED)
-    boss.move(-4.0)
-    world.run(15.0)
-    assert world.stands()
-    world.until_state(1, S.FAILED, within=20)
-    assert world.state(1) == (S.FAILED, R.NOT_ALLOWED)
-    assert agent.said("task 1 may drive 3 m: its way is 6.0 m")
+    world.client = limited(max_distance=3.0)
+    check(
+        world,
+        """
+plan; GO 0.01 0 0 0 at=2,0; TASK_OPTIONS 5 20 0 0 frame=2 & wait 1 : ACCEPTED task 1: SCHEDULED
+boss> TASK_MOVE -4 & wait 15 : ACCEPTED it STANDS
+until 1 FAILED : - task 1: FAILED NOT_ALLOW / task 1 may drive 3 m: its way is 6.0 m
+""",
+        boss=signing(world, BOSS, name="boss"),
+    )
     assert world.pose()[0] == pytest.approx(-4.0, abs=0.1)
 
 
@@ -272,32 +257,50 @@ plan; GO 0.01 0 0 0 at=1,0; DO_SET_RELAY 0 1 0 0 frame=2 & wait 1 : DENIED
 def test_a_name_that_is_given_again_does_not_own_the_tasks_of_the_old_key(
     make_world: MakeWorld, path: Path
 ) -> None:
-    world, key, again = (
-        make_world(store=PromptSqliteStore(path, wall_offset=UTC)),
-        agents(),
-        agents(secret=bytes(range(2, 34))),
+    key, again = agents(), agents(secret=bytes(range(2, 34)))
+    world = opened(make_world(store=PromptSqliteStore(path, wall_offset=UTC)), BOSS, key)
+    check(
+        world,
+        """
+boss> TASK_MOVE 20 : ACCEPTED #1
+old> TASK_MOVE 1 0 0 0 0 0 5 : ACCEPTED #2
+old> TASK_MOVE 1 0 0 7 0 0 5 : ACCEPTED #3
+""",
+        old=signing(world, key),
+        boss=signing(world, BOSS, name="boss"),
     )
-    old, boss = signing(opened(world, BOSS, key), key), signing(world, BOSS, name="boss")
-    assert answer(world, boss.move(20.0)) == (ACCEPTED, 1)
-    assert answer(world, old.move(1.0)) == (ACCEPTED, 2)
-    assert answer(world, old.move(1.0, nonce=7)) == (ACCEPTED, 3)
     put(world, BOSS, again)
-    new = signing(world, again, name="new")
-    assert answer(world, new.command(CANCEL, 2)) == NOT_ALLOWED
-    assert new.said("task 2 belongs to")
-    assert answer(world, new.move(1.0, nonce=7)) == (ACCEPTED, 4)
+    check(
+        world,
+        """
+new> TASK_CANCEL 2 : NOT_ALLOWED / task 2 belongs to
+new> TASK_MOVE 1 0 0 7 0 0 5 : ACCEPTED #4
+""",
+        new=signing(world, again, name="new"),
+    )
     restart(world, path, away=0.0, settles=0.0)
     opened(world, BOSS, again, Key("first", SECRET, "submitter"))
-    new, first = signing(world, again, name="newer"), signing(world, key, name="first")
-    assert answer(world, new.command(CANCEL, 2)) == NOT_ALLOWED
-    assert answer(world, first.move(1.0, nonce=7)) == (ACCEPTED, 3)
-    assert answer(world, first.command(CANCEL, 2)) == (ACCEPTED, 2)
+    check(
+        world,
+        """
+new> TASK_CANCEL 2 : NOT_ALLOWED
+first> TASK_MOVE 1 0 0 7 0 0 5 : ACCEPTED #3
+first> TASK_CANCEL 2 : ACCEPTED #2
+""",
+        new=signing(world, again, name="newer"),
+        first=signing(world, key, name="first"),
+    )
 
 
 def test_a_nonce_belongs_to_its_key(world: World, limited: Callable[..., FakeClient]) -> None:
-    agent = limited(max_speed=0.1, max_distance=1.0)
-    boss = signing(world, BOSS, name="boss", system_id=77)  # the same address
-    assert answer(world, boss.move(12.0, speed=1.6, nonce=4711)) == (ACCEPTED, 1)
-    assert answer(world, agent.move(12.0, speed=1.6, nonce=4711)) == NOT_ALLOWED
-    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)
-    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)
+    world.client = limited(max_speed=0.1, max_distance=1.0)
+    check(
+        world,
+        """
+boss> TASK_MOVE 12 1.6 0 4711 0 0 5 : ACCEPTED #1
+TASK_MOVE 12 1.6 0 4711 0 0 5 : NOT_ALLOWED
+TASK_MOVE 1 0 0 4711 0 0 5 : ACCEPTED #2
+TASK_MOVE 1 0 0 4711 0 0 5 : ACCEPTED #2
+""",
+        boss=signing(world, BOSS, name="boss", system_id=77),  # the same address
+    )

@@ -7,9 +7,9 @@ from mav_tasks.config.settings import (
 )
 from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.tasks.events import VehicleNoted
-from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import for_each
+from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.test_parameters import ask, put, told
 
@@ -20,22 +20,16 @@ def change(world: World, settings: Settings) -> None:
 
 
 def test_the_next_task_is_driven_at_the_new_speed(world: World) -> None:
-    world.client.move(2)
-    world.until_state(1, S.EXECUTING)
+    check(world, "TASK_MOVE 2 & until 1 EXECUTING : ACCEPTED")
     change(world, Settings(driving=Driving(speed=1.2)))
-    world.until_idle(tasks=1)
-    world.client.move(5)
-    world.until_faster(1.1)
-    world.until_idle(tasks=2)
+    check(world, "idle 1 : -\nTASK_MOVE 5 & faster 1.1 & idle 2 : ACCEPTED")
 
 
 def test_a_lower_limit_slows_down_at_once(world: World) -> None:
-    world.client.move(10, speed=1.5)
-    world.until_faster(1.4)
+    check(world, "TASK_MOVE 10 1.5 & faster 1.4 : ACCEPTED")
     change(world, Settings(driving=Driving(max_speed=0.6)))
-    world.run(3)
+    check(world, "wait 3 : - task 1: EXECUTING")
     assert world.truth.forward_speed < 0.65
-    assert world.state(1)[0] is S.EXECUTING
 
 
 @for_each("limit, is_lost", [(1.5, True), (20.0, False)])

@@ -12,6 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
+from tests.kit.rows import check
 from tests.kit.world import Outputs, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -85,74 +86,47 @@ def test_no_motion_on_data_older_than_0_3_s(driving: World) -> None:
 
 
 def test_a_lost_task_does_not_resume_while_paused_by_an_operator(driving: World) -> None:
-    world = driving
-    world.fault(Faults(withheld=frozenset({POSITION})))
-    world.until_state(1, S.PAUSED, within=2)
-    world.client.pause()
-    world.run(1)
-    world.fault(Faults())
-    world.run(6)
-    assert (world.state(1)[0], world.paused()) == (S.PAUSED, R.OPERATOR)
-    world.client.proceed()
-    world.until_idle(tasks=2)
+    check(
+        driving,
+        """
+fault withheld=32,32 & until 1 PAUSED within=2 : -
+PAUSE & wait 1 : ACCEPTED
+fault & wait 6 : - task 1: PAUSED / queue OPERATOR
+CONTINUE & idle 2 : ACCEPTED
+""",
+    )
 
 
 def test_a_lost_task_does_not_resume_on_a_disarmed_rover(driving: World) -> None:
-    world = driving
-    world.fault(Faults(silent=True))
-    world.until_state(1, S.PAUSED, within=2)
-    world.operator_arm(False)
-    world.run(4)
-    world.fault(Faults())
-    world.run(8)
-    assert world.state(1)[0] is S.PAUSED
-    assert not world.rover.autopilot.armed
+    check(
+        driving,
+        """
+fault silent=1 & until 1 PAUSED within=2 : -
+operator disarms & wait 4 : -
+fault & wait 8 : - task 1: PAUSED / it is DISARMED
+""",
+    )
 
 
-@for_each("jump", [(2.5, 0.0), (0.0, -30.0), (50.0, 0.0)])
-def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float, float]) -> None:
-    world = driving
-    world.fault(Faults(position_jump=jump))
-    world.run(1)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    world.until(world.stands, within=2)
-    world.run(10)
-    assert world.state(2)[0] is S.QUEUED
-    world.client.stop()
-    world.run(1)
-    assert world.state(1) == (S.KILLED, R.STOP)
-
-
-def test_a_reboot_holds_the_task_and_the_rates_are_asked_for_again(driving: World) -> None:
-    world = driving
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(2)
-    at = world.now
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    world.run(5)
-    before = len(list(world.client.of_id(POSITION)))
-    world.run(2)
-    assert len(list(world.client.of_id(POSITION))) - before >= 16
-    assert set(world.observer.sent_since(at)) <= {"511"}
-    assert world.stands()
+@for_each("jump", ["2.5,0", "0,-30", "50,0"])
+def test_a_jump_of_the_position_holds_the_task(driving: World, jump: str) -> None:
+    check(
+        driving,
+        f"""
+fault position_jump={jump} & wait 1 : - task 1: HELD FRAME_RESET
+wait 2 : - it STANDS
+wait 10 : - task 2: QUEUED
+TASK_STOP & wait 1 : ACCEPTED task 1: KILLED STOP
+""",
+    )
 
 
 def test_a_reboot_that_only_the_rovers_clock_tells_of_holds_the_task_too(driving: World) -> None:
     world = driving
-    world.client.pause()
-    world.run(4)
-
-    def loses(source: str, target: str, data: bytes) -> bool:
-        return source == "rover1" and data[7] == HEARTBEAT
-
-    world.watched.loses = loses
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(1.5)
-    world.operator_mode(Mode.HOLD)  # as it was before
-    world.run(0.1)
+    check(world, "PAUSE & wait 4 : ACCEPTED\nlose 0 & reboot & wait 1.5 : -")
+    check(world, "operator hold & wait 0.1 : -")  # as it was before
     world.watched.loses = lambda *_: False
-    world.run(3)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    check(world, "wait 3 : - task 1: HELD FRAME_RESET")
 
 
 @for_each("late", [0.55, 1.0, 2.5])
@@ -161,14 +135,9 @@ def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: fl
     world.observer.expects_gaps = True
     world.suspend_server(late)
     at = world.now
-    world.run(0.1)
-    assert world.observer.sent_since(at)[0] == "zero"
-    assert "move" not in world.observer.sent_since(at)
-    assert world.state(1) == (S.HELD, R.LATE)
+    check(world, "wait 0.1 : - task 1: HELD LATE / it gets zero / !move")
     assert len(world.observer.sent_since(at)) < 8
-    world.until(world.stands, within=3)
-    world.run(2)
-    assert world.rover.autopilot.mode is Mode.HOLD
+    check(world, "wait 5 : - it STANDS / mode hold")
 
 
 def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(
@@ -201,12 +170,6 @@ def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(
 
 
 def test_what_came_while_the_server_stood_still_is_not_taken_for_fresh(driving: World) -> None:
-    world = driving
-    world.observer.expects_gaps = True
-    world.suspend_server(0.1)
-    world.fault(Faults(withheld=frozenset({POSITION})))
-    world.suspend_server(0.35)
-    at = world.now
-    world.run(0.2)
-    assert world.state(1)[0] is S.EXECUTING
-    assert set(world.observer.sent_since(at)) == {"zero"}
+    driving.observer.expects_gaps = True
+    check(driving, "sleep 0.1 & fault withheld=32,32 & sleep 0.35 & wait 0 : -")
+    check(driving, "wait 0.2 : - task 1: EXECUTING / it gets zero.")

@@ -7,23 +7,19 @@ from mav_tasks.engine.inputs import PeerChanged
 from mav_tasks.shell.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
-    AUTO,
-    DENIED,
-    TEMPORARILY_REJECTED,
     sticks,
 )
 from tests.kit.mission import Download, Item, Upload, acks, currents, reached
-from tests.kit.rows import check
+from tests.kit.rows import ask, check
 from tests.kit.store import LateStore
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, SERVO, MODE = 16, 183, 176
-START, SET_CURRENT = 300, 224
+START = 300
 HOME = Item(WAYPOINT, frame=0, current=1)
 COMPLETE = 5
 
@@ -105,47 +101,45 @@ def test_a_refused_plan_leaves_the_one_before(world: World) -> None:
 
 def test_two_wishes_to_start_are_one_and_later_it_is_another_task(world: World) -> None:
     uploaded(world, HOME, place(0.3, 0, hold=0.1))
-    world.client.mode(AUTO)
-    world.run(0.1)
-    assert start(world) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED)
-    world.run(3)
-    assert start(world) == (ACCEPTED, 2)
-    world.until_state(2, S.COMPLETED)
+    check(
+        world,
+        """
+DO_SET_MODE 1 10 to=autopilot & wait 0.1 : ACCEPTED
+MISSION_START to=autopilot & until 1 COMPLETED : ACCEPTED #1
+wait 3 : -
+MISSION_START to=autopilot & until 2 COMPLETED : ACCEPTED #2
+""",
+    )
     assert currents(world.client)[-1].mission_id == 2
 
 
 def test_a_start_that_is_repeated_while_the_mission_waits_ends_nothing(world: World) -> None:
     """A copy of it, or the button again: somebody has disarmed the rover and paused its queue."""
     uploaded(world)
-    person = world.add_client("person")
-    world.run(1)
-    person.arm(False)
-    world.run(1.5)
-    person.pause()
-    world.run(1.5)
-    for wait in (0.5, 5.0, 0.5):
-        assert start(world) == (ACCEPTED, 1)
-        world.run(wait)
-        assert world.state(1) == (S.QUEUED, R.NONE)
-    world.client.arm(True)
-    world.client.proceed()
-    world.until_state(1, S.COMPLETED, within=60)
+    check(
+        world,
+        """
+person> ARM 0 & wait 1.5 : ACCEPTED
+person> PAUSE & wait 1.5 : ACCEPTED
+MISSION_START to=autopilot & wait 0.7 : ACCEPTED #1 / task 1: QUEUED NONE
+MISSION_START to=autopilot & wait 5.2 : ACCEPTED #1 / task 1: QUEUED NONE
+MISSION_START to=autopilot & wait 0.7 : ACCEPTED #1 / task 1: QUEUED NONE
+ARM 1 & CONTINUE & until 1 COMPLETED within=60 : ACCEPTED+ACCEPTED
+""",
+        person=world.add_client("person"),
+    )
 
 
-@for_each("what, reason", [("STOP", R.STOPPED), ("disarmed", R.DISARMED)])
+@for_each("what, reason", [("TASK_STOP", R.STOPPED), ("operator disarms", R.DISARMED)])
 def test_after_a_stop_or_while_it_may_not_be_armed_a_start_is_refused(
     world: World, what: str, reason: R
 ) -> None:
     uploaded(world)
     start(world)
     world.until_state(1, S.EXECUTING)
-    if what == "STOP":
-        world.client.stop()
-    else:
-        world.operator_arm(False)
-    world.run(4)
-    assert start(world) == (TEMPORARILY_REJECTED, reason)
+    ask(world, what)
+    check(world, f"wait 4 : {'ACCEPTED' * (reason is R.STOPPED) or '-'}")
+    check(world, f"MISSION_START to=autopilot : BUSY #{reason}")
 
 
 @for_each("how", ["command", "message"])
@@ -154,9 +148,7 @@ def test_another_item_is_gone_on_with(world: World, how: str) -> None:
     start(world)
     world.until_state(1, S.EXECUTING)
     if how == "command":
-        sent = world.client.command(SET_CURRENT, 3, target=(1, 1))
-        world.run(0.1)
-        assert sent.answer == (ACCEPTED, 1)
+        check(world, "DO_SET_MISSION_CURRENT 3 to=autopilot & wait 0.1 : ACCEPTED #1")
     else:
         before = len(currents(world.client))
         world.client.send(set_current(3))
@@ -194,26 +186,28 @@ def test_an_upload_ends_with_the_connection_of_its_client(world: World) -> None:
 
 def test_clearing_takes_away_what_waits_and_not_what_is_driven(world: World) -> None:
     uploaded(world)
-    world.client.send(clear_all())
-    world.run(0.2)
-    assert acks(world.client)[-1].result == 0
-    assert world.state(1) == (S.CANCELLED, R.CLEARED)
-    assert start(world) == (DENIED, R.NOT_FOUND)
+    check(
+        world,
+        f"""
+mission_clear_all 0 : ACCEPTED task 1: CANCELLED CLEARED
+MISSION_START to=autopilot : DENIED #{R.NOT_FOUND}
+""",
+    )
     uploaded(world)
-    start(world)
-    world.until_state(2, S.EXECUTING)
-    world.client.send(clear_all())
-    world.run(0.2)
-    assert acks(world.client)[-1].result == 14
-    world.until_state(2, S.COMPLETED, within=60)
+    check(
+        world,
+        """
+MISSION_START to=autopilot & until 2 EXECUTING : ACCEPTED
+mission_clear_all 0 : DENIED
+until 2 COMPLETED within=60 : -
+""",
+    )
 
 
 def test_without_the_claim_missions_are_the_rovers_own(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(claim=False))
-    world.client.send(clear_all())
-    world.run(1)
+    check(world, "mission_clear_all 0 : ACCEPTED MISSION_ACK@1")
     assert world.tasks() == ()
-    assert acks(world.client)
 
 
 def servo(number: int, pwm: float = 1500.0) -> Item:
@@ -229,18 +223,15 @@ def ordered(world: World, since: float = 0.0) -> list[float]:
     ]
 
 
-@for_each("what", ["STOP", "disarm"])
+@for_each("what", ["TASK_STOP & wait 0.05", "operator disarms & wait 1.05"])
 def test_nothing_more_is_ordered_after_a_stop_or_a_takeover(world: World, what: str) -> None:
+    """A takeover shows with the rover's next heartbeat."""
     uploaded(world, HOME, place(1, 0), servo(5, 1100), servo(5, 1900), servo(6), place(6, 0))
     start(world)
     world.lose_acks()
     world.until(lambda: ordered(world), within=30)
-    if what == "STOP":
-        world.client.stop()
-    else:
-        world.operator_arm(False)
-        world.run(1.0)  # until its next heartbeat shows it
-    world.run(0.05)
+    for each in what.split(" & "):
+        ask(world, each)
     at_stop = world.now
     world.run(3)
     assert ordered(world, at_stop) == []
@@ -250,30 +241,28 @@ def test_a_start_while_it_is_being_cancelled_is_refused_and_then_it_is_another(
     world: World,
 ) -> None:
     uploaded(world)
-    start(world)
-    world.until_state(1, S.EXECUTING)
-    world.run(2)
-    world.client.command(54010, 1)
-    assert start(world) == (TEMPORARILY_REJECTED, R.QUEUE_PAUSED)
-    world.until_state(1, S.CANCELLED)
-    assert start(world) == (ACCEPTED, 2)
+    check(
+        world,
+        f"""
+MISSION_START to=autopilot & until 1 EXECUTING : ACCEPTED
+wait 2 & TASK_CANCEL 1 & MISSION_START to=autopilot : BUSY+ACCEPTED #{R.QUEUE_PAUSED}
+until 1 CANCELLED : -
+MISSION_START to=autopilot : ACCEPTED #2
+""",
+    )
 
 
 @for_each("how", ["moving", "sticks"])
 def test_nobody_is_taken_the_sticks_from_by_a_start(world: World, how: str) -> None:
     uploaded(world)
-    world.operator_arm(True)
-    world.operator_mode(Mode.MANUAL)
-    world.run(1.5)
+    check(world, "operator arms & operator manual & wait 1.5 : -")
     if how == "moving":
         world.rover.autopilot.operator_sticks(0.5, 0.0)
     else:
         world.add_client("pilot").stream(sticks(300), rate=10)
     world.run(1.5)
     at_start = world.now
-    answer = start(world)
-    assert answer is not None
-    assert answer[0] == TEMPORARILY_REJECTED
+    check(world, "MISSION_START to=autopilot & wait 0.2 : BUSY")
     assert world.observer.sent_since(at_start) in ([], ["MANUAL_CONTROL"])
 
 
@@ -303,13 +292,10 @@ def test_a_start_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> Non
     world = make_world(store=store)
     uploaded(world)
     store.delay = 5.0
-    sent = world.client.command(START, target=(1, 1))
-    world.run(1)
-    assert sent.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
-    assert world.state(1)[0] is S.BLOCKED
+    refused = f"BUSY #{R.STORE_UNAVAILABLE} / task 1: BLOCKED"
+    check(world, f"MISSION_START to=autopilot & wait 1 : {refused}")
     store.delay = 0.0
-    world.run(6)
-    assert start(world) == (ACCEPTED, 1)
+    check(world, "wait 6 : -\nMISSION_START to=autopilot : ACCEPTED #1")
 
 
 @for_each("kind", [3, 77, 255])

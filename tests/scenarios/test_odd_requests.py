@@ -76,7 +76,7 @@ fault : -
 lose 77 : -
 ARM 1 & ARM 1 21196 : -
 ARM 0 21196 & ARM 0 21196 : BUSY+BUSY is busy, try again
-wait 5 : BUSY+BUSY no answer
+wait 5.4 : BUSY+BUSY no answer
 TASK_STOP : ACCEPTED
 NAV_LAND : BUSY STOP is in force: press Continue first
 """,
@@ -85,7 +85,7 @@ NAV_LAND : BUSY STOP is in force: press Continue first
             {},
             """
 TASK_MOVE 0.2 : ACCEPTED
-wait 4 : - Task 1 done
+wait 4.4 : - Task 1 done
 TASK_CANCEL 99 : DENIED no task 99
 TASK_CANCEL 0 : DENIED no task is running
 TASK_CANCEL -1 : DENIED param1 task -1
@@ -145,10 +145,10 @@ rover:mission_request_int 250 191 0 2 : -
 rover:mission_ack 250 191 1 1 : DENIED rover 1 refused it: ERROR
 lose 47 : -
 fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
-wait 10 : ERROR rover 1 did not answer: not stored
+wait 10.4 : ERROR rover 1 did not answer: not stored
 lose 77 : -
 plan; DO_SET_SERVO 1 1500 : ACCEPTED
-wait 10 : - did not answer command 183 of the plan
+wait 10.4 : - did not answer command 183 of the plan
 """,
         ),
         (
@@ -168,7 +168,7 @@ rover:rc_channels 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 : -
 rover:param_value SERVO1_FUNCTION nan 9 1 1 : -
 rover:autopilot_version 0 0 0 0 0 EIGHT EIGHT EIGHT 0 0 1 : -
 TASK_MOVE 0.2 : ACCEPTED #1
-wait 4 : - Task 1 done
+wait 4.4 : - Task 1 done
 TASK_MOVE 9 : ACCEPTED #2
 wait 2 & ARM 0 21196 to=autopilot : ACCEPTED Task 2 stopped for good
 MANY_TEXTS : - 0000000041
@@ -180,17 +180,17 @@ MANY_TEXTS : - 0000000041
 mission; NAV_WAYPOINT; NAV_WAYPOINT at=0.2,0; NAV_WAYPOINT at=0.3,0 : ACCEPTED #1
 MISSION_START 2 : ACCEPTED
 mission : DENIED task 1 has started: cancel it first
-wait 8 : - Task 1 done
+wait 8.4 : - Task 1 done
 mission_set_current 1 : - The mission will start with item 1
 DO_SET_MISSION_CURRENT 1 : ACCEPTED The mission will start with item 1
 plan; NAV_WAYPOINT 60 x=2147483647 : ACCEPTED #2
 MISSION_START : ACCEPTED
-wait 1 : -
+wait 1.4 : -
 fault position_jump=50,0 : -
-wait 1 : -
+wait 1.4 : -
 MISSION_START : ACCEPTED
 fault : -
-wait 1 : -
+wait 1.4 : -
 TASK_RELEASE 2 2 : ACCEPTED
 TASK_RELEASE 2 2 : ACCEPTED task 2: already skipped
 DO_SET_MODE 1 11 to=autopilot : ACCEPTED #3
@@ -203,7 +203,7 @@ DO_SET_MODE 1 11 to=autopilot : ACCEPTED
 TASK_DRIVE 0 20 1 : DENIED param2 yaw rate: rover 1 steers like a car
 NAV_SET_YAW_SPEED 90 0 : DENIED param2 speed 0: rover 1 steers like a car
 TASK_MOVE 0.3 : ACCEPTED #1
-wait 5 : - Task 1 done
+wait 5.4 : - Task 1 done
 """,
         ),
         (
@@ -217,13 +217,13 @@ plan; DO_SET_REVERSE 1; NAV_WAYPOINT at=1,0 : INVALID_PARAM1 leave DO_SET_REVERS
             {},
             """
 SET_MESSAGE_INTERVAL 24 100000 : ACCEPTED
-wait 2 : - GPS_RAW_INT@1
+wait 2.4 : - GPS_RAW_INT@1
 lose 77 & SET_MESSAGE_INTERVAL 24 0 : ACCEPTED
-wait 5 : - GPS_RAW_INT@1
+wait 5.4 : - GPS_RAW_INT@1
 unread & TASK_MOVE 1 to=any & wait 4 & read : BUSY delayed by the server: send it again
 mission; NAV_WAYPOINT; NAV_WAYPOINT at=9,0 : ACCEPTED
 MISSION_START : ACCEPTED
-wait 3 & fault position_jump=50,0 & wait 1 : -
+wait 3 & fault position_jump=50,0 & wait 1.4 : -
 unread & mission_clear_all 0 & wait 2 & read : DENIED clear: delayed by the server
 """,
         ),
@@ -235,16 +235,16 @@ wait 1 & rover:command_ack 511 2 0 0 250 191 : -
 wait 1 & rover:command_ack 511 2 0 0 250 191 : -
 wait 1 & rover:command_ack 511 2 0 0 250 191 : -
 fault : -
-wait 2 : - GPS_RAW_INT@1
+wait 2.4 : - GPS_RAW_INT@1
 """,
         ),
         (
             {"persona": replace(PROMPT_PX4, autopilot=MavAutopilot.GENERIC)},
             """
 TASK_MOVE 4 : ACCEPTED #1
-wait 3 : -
+wait 3.4 : -
 fault refuse_mode=1 & TASK_STOP : ACCEPTED
-wait 4 : - Disarmed
+wait 4.4 : - Disarmed
 """,
         ),
         (
@@ -265,7 +265,7 @@ fence to=any; NAV_WAYPOINT at=1,0 : UNSUPPORTED belongs to one rover
 TASK_MOVE 1 0 0 9 0 60 to=any : ACCEPTED #1 / Rover 1 chosen: free
 again : ACCEPTED #1
 fault battery=12 : -
-wait 6 : - battery 12%
+wait 6.4 : - battery 12%
 """,
         ),
         (
@@ -274,7 +274,7 @@ wait 6 : - battery 12%
 TASK_MOVE 3 & TASK_MOVE 9 to=second : ACCEPTED+ACCEPTED
 NAV_WAYPOINT 0 0 0 90 to=any at=0,1 frame=0 : ACCEPTED Rover 1 chosen
 fault battery=12 : -
-wait 6 : -
+wait 6.4 : -
 """,
         ),
         (
@@ -283,19 +283,19 @@ wait 6 : -
 TASK_STOP to=second : ACCEPTED
 TASK_MOVE 1 0 0 0 0 60 to=any : ACCEPTED Rover 1 chosen: free
 fault battery=12 : -
-wait 6 : -
+wait 6.4 : -
 """,
         ),
         (
             {},
             """
 lose 77 & TASK_MOVE 0.5 : ACCEPTED #1
-wait 8 : - Task 1 done
+wait 8.4 : - Task 1 done
 lose 200 & TASK_MOVE 0.5 : ACCEPTED #2
-wait 2 & fault refuse_mode=1 & wait 8 : - Task 2 done
+wait 2 & fault refuse_mode=1 & wait 8.4 : - Task 2 done
 fault : -
 TASK_MOVE 9 : ACCEPTED #3
-wait 2 & operator rtl & wait 1 : - Task 3
+wait 2 & operator rtl & wait 1.4 : - Task 3
 rover:statustext 4 LONG 7 0 & rover:statustext 4 LONGER 7 0 : - failsafe: Failsafexxxx / x[?]
 """,
         ),
@@ -303,13 +303,13 @@ rover:statustext 4 LONG 7 0 & rover:statustext 4 LONGER 7 0 : - failsafe: Failsa
             {"realism": replace(PROMPT.realism, tells_origin=False)},
             """
 rover:gps_global_origin -353632620 1491652370 0 : -
-NAV_WAYPOINT at=0.3,0 frame=0 & wait 7 : ACCEPTED Task 1 done
-fault withheld=33,49,242 & reboot & wait 12 : - Rover 1 restarted
+NAV_WAYPOINT at=0.3,0 frame=0 & wait 7.4 : ACCEPTED Task 1 done
+fault withheld=33,49,242 & reboot & wait 12.4 : - Rover 1 restarted
 NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED Task 2 waits: no valid position
 REQUEST_MESSAGE 54000 2 & TASK_CANCEL 2 : ACCEPTED+ACCEPTED
 plan; GO x=30000 y=0 frame=1; GO at=6,0; GO at=7,0 : ACCEPTED #3
-wait 12 : - Task 3 paused: position lost
-fault & wait 15 : - Task 3 done
+wait 12.4 : - Task 3 paused: position lost
+fault & wait 15.4 : - Task 3 done
 """,
         ),
         (
@@ -323,7 +323,7 @@ mission_count 1 : DENIED role observer may not
             {"settings": Settings(roles=Roles("submitter"))},
             """
 DO_PAUSE_CONTINUE 0 : ACCEPTED
-wait 4 : -
+wait 4.4 : -
 DO_REPOSITION -1 1 0 nan at=1,0 frame=0 : ACCEPTED Task 1 waits, press Continue
 CLICK at=2,0 frame=0 : ACCEPTED Task 2 waits, press Continue
 """,
@@ -351,19 +351,19 @@ ARM 1 : ACCEPTED
             {},
             """
 TASK_MOVE 9 : ACCEPTED #1
-wait 3 & fault position_jump=50,0 & wait 1 : - Task 1 held: position reference changed
+wait 3 & fault position_jump=50,0 & wait 1.4 : - Task 1 held: position reference changed
 TASK_MOVE 1 to=any : BUSY no rover can: rover 1: a task is held
-fault & wait 5 : -
-DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED
+fault & wait 5.4 : -
+DO_PAUSE_CONTINUE 0 & wait 5.4 : ACCEPTED
 CLICK at=5,0 frame=0 : ACCEPTED #2
 TASK_RELEASE 1 0 : DENIED task 2 is executing: release task 1 later
 TASK_MOVE 1 : ACCEPTED Task 3 waits, press Continue
 REQUEST_MESSAGE 54000 3 : ACCEPTED
-DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED Task 2 paused
+DO_PAUSE_CONTINUE 0 & wait 5.4 : ACCEPTED Task 2 paused
 TASK_RELEASE 1 0 : ACCEPTED Task 1 waits: released
-DO_PAUSE_CONTINUE 1 & wait 3 : ACCEPTED task 1 is next
-fault position_jump=50,0 & wait 1 : - Task 1 held / Task 2 held
-fault & wait 5 & DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED
+DO_PAUSE_CONTINUE 1 & wait 3.4 : ACCEPTED task 1 is next
+fault position_jump=50,0 & wait 1.4 : - Task 1 held / Task 2 held
+fault & wait 5 & DO_PAUSE_CONTINUE 0 & wait 5.4 : ACCEPTED
 CLICK at=6,0 frame=0 : ACCEPTED #4
 TASK_STOP : ACCEPTED Task 4 stopped for good
 wait 5 & TASK_RELEASE 1 0 : BUSY STOP is in force: press Continue first
@@ -376,17 +376,17 @@ TASK_CANCEL 1 : ACCEPTED Task 1 cancelled
 fault refuse_arm=1 : -
 TASK_MOVE 1 : ACCEPTED #1
 DO_CHANGE_SPEED 1 0.3 : ACCEPTED
-wait 1 & fault refuse_arm=1 position_jump=50,0 & wait 2 : - not ready to arm
-fault & wait 9 : - Task 1 done
+wait 1 & fault refuse_arm=1 position_jump=50,0 & wait 2.4 : - not ready to arm
+fault & wait 9.4 : - Task 1 done
 DO_SET_MODE 1 11 to=autopilot & wait 3 & DO_PAUSE_CONTINUE 0 : ACCEPTED+ACCEPTED Task 2 paused
 wait 5 & DO_PAUSE_CONTINUE 1 : ACCEPTED task 2 is next, return home
-wait 9 : - Task 2 done
+wait 9.4 : - Task 2 done
 plan; GO at=1,0; NAV_SET_YAW_SPEED 45 0.5 : ACCEPTED #3
 wait 7 & DO_CHANGE_SPEED 1 0.4 : ACCEPTED
 TASK_CANCEL 0 & TASK_MOVE 1 to=any : ACCEPTED+ACCEPTED Rover 1 chosen: free in
-wait 9 : - Task 3 cancelled / Task 4 done
+wait 9.4 : - Task 3 cancelled / Task 4 done
 plan; GO x=50000 y=0 frame=1 : ACCEPTED
-wait 3 & reboot & wait 8 : - Task 5 held
+wait 3 & reboot & wait 8.4 : - Task 5 held
 TASK_RELEASE 5 1 : DENIED the position reference of task 5 is lost
 """,
         ),
@@ -395,7 +395,7 @@ TASK_RELEASE 5 1 : DENIED the position reference of task 5 is lost
             """
 TASK_MOVE 1 0 0 0 0 60 : ACCEPTED #1
 TASK_MOVE 2 0 0 0 1 10 : ACCEPTED #2
-TASK_MOVE 0.3 to=any & wait 4 : ACCEPTED Rover 1 chosen: free
+TASK_MOVE 0.3 to=any & wait 4.4 : ACCEPTED Rover 1 chosen: free
 DO_PAUSE_CONTINUE 0 : ACCEPTED
 TASK_MOVE 3 : ACCEPTED #4
 TASK_MOVE 2 0 0 0 4 : ACCEPTED #5
@@ -417,16 +417,16 @@ TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue paused
         (
             {},
             """
-TASK_MOVE 9 & wait 2 & operator rtl & wait 1 : ACCEPTED Task 1 paused: takeover
+TASK_MOVE 9 & wait 2 & operator rtl & wait 1.4 : ACCEPTED Task 1 paused: takeover
 DO_PAUSE_CONTINUE 0 & rover:statustext 4 Failsafe 0 0 : ACCEPTED was taken over by its failsafe
 operator hold & wait 4 & TASK_CANCEL 1 & DO_PAUSE_CONTINUE 1 : ACCEPTED+ACCEPTED
 plan; GO at=3,0; CONDITION_DELAY 2; DO_SET_SERVO 1 1 & wait 15 : ACCEPTED Task 2 done / command 183
-TASK_MOVE 1 & fault silent=1 deaf=1 & wait 5 : ACCEPTED Task 3 paused: position lost
-reboot & fault & wait 20 : - Rover 1 restarted / Task 3 done
-fault deaf=1 & reboot & wait 4 : - Rover 1 restarted
+TASK_MOVE 1 & fault silent=1 deaf=1 & wait 5.4 : ACCEPTED Task 3 paused: position lost
+reboot & fault & wait 20.4 : - Rover 1 restarted / Task 3 done
+fault deaf=1 & reboot & wait 4.4 : - Rover 1 restarted
 rover:command_ack 511 2 0 0 250 191 : -
 rover:command_ack 511 2 0 0 250 191 : -
-fault & wait 2 : - LOCAL_POSITION_NED@1
+fault & wait 2.4 : - LOCAL_POSITION_NED@1
 """,
         ),
         (
@@ -445,14 +445,14 @@ operator manual & wait 4 & TASK_MOVE 1 to=any : BUSY no rover can: rover 1: wron
             {},
             """
 plan; GO at=1,0; GO at=2,0; GO at=2,4; GO at=2,8 : ACCEPTED #1
-wait 2 : -
+wait 2.4 : -
 fence; POND 4 at=1.5,5; POND 4 at=2.5,5; POND 4 at=2.5,6; POND 4 at=1.5,6 : ACCEPTED
-wait 22 : - would leave the fence in task 1 / Task 1 held: stopped at the fence
+wait 22.4 : - would leave the fence in task 1 / Task 1 held: stopped at the fence
 TASK_CANCEL 1 & wait 2 & CLICK at=0,0 frame=0 : ACCEPTED+ACCEPTED #2
 CLICK at=0,9 frame=0 : ACCEPTED #3
 TASK_STOP : ACCEPTED Task 2 stopped for good / Task 3 stopped for good
-wait 4 & DO_PAUSE_CONTINUE 1 & TASK_MOVE -4 & wait 3 : ACCEPTED+ACCEPTED Task 4 started
-TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED Task 4 cancelled / Rover 1 restarted
+wait 4 & DO_PAUSE_CONTINUE 1 & TASK_MOVE -4 & wait 3.4 : ACCEPTED+ACCEPTED Task 4 started
+TASK_CANCEL 0 & reboot & wait 3.4 : ACCEPTED Task 4 cancelled / Rover 1 restarted
 """,
         ),
         (
@@ -464,13 +464,13 @@ TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED Task 4 cancelled / Rover 1 restarted
                 )
             },
             """
-fault refuse_mode=1 withheld=30,32 & TASK_MOVE 0.1 & wait 0.4 & BLIND & wait 2 : ACCEPTED #1
-fault & wait 9 : - Task 1 done
+fault refuse_mode=1 withheld=30,32 & TASK_MOVE 0.1 & wait 0.4 & BLIND & wait 2.4 : ACCEPTED #1
+fault & wait 9.4 : - Task 1 done
 TASK_MOVE -4 : ACCEPTED #2
 NAV_WAYPOINT at=3,0 frame=0 : ACCEPTED #3
 TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue full
-wait 15 : - Task 2 done / Task 3 failed: bad parameter
-lose 0 & TASK_MOVE 4 & wait 3 : ACCEPTED Task 4 failed: start timeout
+wait 15.4 : - Task 2 done / Task 3 failed: bad parameter
+lose 0 & TASK_MOVE 4 & wait 3.4 : ACCEPTED Task 4 failed: start timeout
 """,
         ),
         (
@@ -479,22 +479,22 @@ lose 0 & TASK_MOVE 4 & wait 3 : ACCEPTED Task 4 failed: start timeout
                 "settings": Settings(watch=Watch(ready_timeout=5), queueing=Queueing(capacity=1)),
             },
             """
-mission; GO at=0.3,0 & wait 1 : ACCEPTED #1
-DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 9 : ACCEPTED+ACCEPTED Task 1 done
+mission; GO at=0.3,0 & wait 1.4 : ACCEPTED #1
+DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 9.4 : ACCEPTED+ACCEPTED Task 1 done
 ARM 0 & wait 5 & TASK_MOVE 1 0 0 0 0 60 : ACCEPTED+ACCEPTED #2
-DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 1 : ACCEPTED+ACCEPTED queue full: 1
+DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 1.4 : ACCEPTED+ACCEPTED queue full: 1
 TASK_CANCEL 2 & ARM 0 & wait 5 & DO_PAUSE_CONTINUE 1 : ACCEPTED+ACCEPTED+ACCEPTED
 fault refuse_arm=1 : -
-TASK_MOVE 3 & wait 1 : ACCEPTED not ready to arm
+TASK_MOVE 3 & wait 1.4 : ACCEPTED not ready to arm
 rover:param_value COM_OBL_RC_ACT 1 9 1 1 : - keeps moving when setpoints stop
-fault & wait 9 : - Task 3 failed: loss failsafe
+fault & wait 9.4 : - Task 3 failed: loss failsafe
 """,
         ),
         (
             {"persona": PROMPT_PX4, "settings": Settings(yaw_rate="honoured")},
             """
 TASK_ROTATE 10 : ACCEPTED #1
-wait 5 : - Task 1 failed: stuck
+wait 5.4 : - Task 1 failed: stuck
 """,
         ),
         (
@@ -504,12 +504,12 @@ wait 5 : - Task 1 failed: stuck
                 "store": LateStore(delay=1.0),
             },
             """
-TASK_MOVE 9 to=any & again & wait 4 : ACCEPTED Task 1 started
+TASK_MOVE 9 to=any & again & wait 4.4 : ACCEPTED Task 1 started
 HOLD & CLICK at=5,0 frame=0 : ACCEPTED Task 1 paused
-BLIND & wait 3 : ACCEPTED stays paused: cannot start: no position
-fault & wait 5 & DO_PAUSE_CONTINUE 1 & wait 3 : ACCEPTED Task 1 started
+BLIND & wait 3.4 : ACCEPTED stays paused: cannot start: no position
+fault & wait 5 & DO_PAUSE_CONTINUE 1 & wait 3.4 : ACCEPTED Task 1 started
 HOLD & CLICK at=6,0 frame=0 : ACCEPTED Task 1 paused
-TASK_STOP & wait 3 : ACCEPTED+ACCEPTED Task 3 waits, press Continue (STOP in force)
+TASK_STOP & wait 3.4 : ACCEPTED+ACCEPTED Task 3 waits, press Continue (STOP in force)
 """,
         ),
     ],
@@ -555,19 +555,19 @@ def test_a_flood_of_refusals_is_answered_and_not_told(world: World) -> None:
     "table",
     [
         """
-TASK_ROTATE 270 & wait 4 : ACCEPTED #1
+TASK_ROTATE 270 & wait 4.4 : ACCEPTED #1
 RESTART
 wait 4 & TASK_RELEASE 1 1 : DENIED the progress of task 1 is unknown
 fault silent=1 & wait 5 & TASK_RELEASE 1 0 : ACCEPTED Task 1 waits: the rover is silent
-wait 25 : - holds task 1 again: waited too long (rover silent). Release it again
+wait 25.4 : - holds task 1 again: waited too long (rover silent). Release it again
 """,
         """
-TASK_MOVE 9 & wait 3 : ACCEPTED #1
+TASK_MOVE 9 & wait 3.4 : ACCEPTED #1
 RESTART
 fault position_jump=0,3 & wait 6 & TASK_RELEASE 1 1 : DENIED the rover is off the path of task 1
 """,
         """
-TASK_MOVE 3 0 0 0 0 0 1 & wait 3 : ACCEPTED #1
+TASK_MOVE 3 0 0 0 0 0 1 & wait 3.4 : ACCEPTED #1
 TASK_MOVE -1 0 0 0 0 0 9 & wait 2 & reboot : ACCEPTED Task 1 paused: preempted
 RESTART
 wait 9 & TASK_CANCEL 2 : ACCEPTED
@@ -577,7 +577,7 @@ wait 9 & DO_PAUSE_CONTINUE 1 : ACCEPTED Task 1 held: position reference changed
 DO_PAUSE_CONTINUE 0 & TASK_MOVE 1 & TASK_ROTATE 9 : ACCEPTED+ACCEPTED+ACCEPTED
 TASK_MODIFY 1 4 2 : ACCEPTED
 RESTART
-wait 4 & DO_PAUSE_CONTINUE 1 & wait 9 : ACCEPTED Task 2 done / Task 1 started
+wait 4 & DO_PAUSE_CONTINUE 1 & wait 9.4 : ACCEPTED Task 2 done / Task 1 started
 """,
         """
 DO_PAUSE_CONTINUE 0 : ACCEPTED
@@ -591,7 +591,7 @@ TASK_MOVE 2 confirmation=1 : ACCEPTED #2
 TASK_MOVE 4 : ACCEPTED #3
 """,
         """
-TASK_MOVE 2 & wait 3 : ACCEPTED #1
+TASK_MOVE 2 & wait 3.4 : ACCEPTED #1
 RESTART
 wait 4 & DO_PAUSE_CONTINUE 1 : ACCEPTED #0 / keeps task 1 on hold: press
 wait 3 & DO_PAUSE_CONTINUE 1 : DENIED #112 / task 1 is held / release it (again

@@ -8,7 +8,8 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, setpoint
-from tests.kit.px4 import HOLD, OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
+from tests.kit.px4 import OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
+from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -35,20 +36,17 @@ def northwards(speed: float) -> Any:
 
 @for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 def test_drives_the_rover_from_when_it_is_asked_for_until_hold(world: World) -> None:
-    sent = ask_mode(world.client, OFFBOARD)
-    world.run(0.2)
-    assert sent.result == ACCEPTED
-    assert world.mode() is Mode.GUIDED
-    world.run(2)
-    assert world.truth.forward_speed > 0.4
-    asked_at = world.now
-    ask_mode(world.client, HOLD)
-    world.run(0.05)
-    assert "HOLD" in world.observer.sent_since(asked_at), "at once: no task of ours is driving"
-    world.run(2)
-    assert world.stands()
-    world.run(2)
-    assert world.stands(), "the stream goes on, and is not passed"
+    """No task of ours is driving: HOLD leaves at once. The stream goes on, and is not passed."""
+    check(
+        world,
+        """
+DO_SET_MODE 1 6 to=autopilot & wait 0.2 : ACCEPTED mode guided
+faster 0.4 : -
+HOLD & wait 0.05 : ACCEPTED it gets hold
+wait 2 : - it STANDS
+wait 2 : - it STANDS
+""",
+    )
 
 
 @for_each("again", [False, True])
@@ -82,18 +80,14 @@ def test_the_recipe_of_stream_mode_and_arming_drives(make_world: MakeWorld, *, a
 
 @for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 def test_does_not_come_back_when_a_task_has_ended(world: World) -> None:
-    ask_mode(world.client, OFFBOARD)
-    world.run(1)
+    check(world, "DO_SET_MODE 1 6 to=autopilot & wait 1 : ACCEPTED")
     world.client.end_streams()
     world.client.stream(setpoint(0.0), rate=5)
     world.run(0.5)
     world.client.end_streams()
-    world.run(2.5)
-    world.client.move(1.0)
-    world.until_state(1, S.EXECUTING, within=10)
+    check(world, "wait 2.5 : -\nTASK_MOVE 1 & until 1 EXECUTING within=10 : ACCEPTED")
     world.client.stream(northwards(-0.5), rate=20)
     world.until_state(1, S.COMPLETED, within=20)
     where = world.truth.north
-    world.run(3)
-    assert world.stands()
+    check(world, "wait 3 : - it STANDS")
     assert abs(world.truth.north - where) < 0.02

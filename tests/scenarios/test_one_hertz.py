@@ -10,8 +10,8 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
-from tests.kit.client import HOLD
 from tests.kit.observer import GAP
+from tests.kit.rows import ask, check
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -25,12 +25,13 @@ def world(make_world: MakeWorld) -> World:
 
 @for_each("pause", [0.0, 0.1, 0.3, 0.5, 0.9, 1.3])
 def test_a_task_right_after_the_last_is_no_takeover(world: World, pause: float) -> None:
-    world.client.move(0.3)
-    world.until(lambda: world.state(1)[0] is S.COMPLETED, within=20)
-    world.run(pause)
-    world.client.move(0.3)
-    world.until_idle(tasks=2)
-    assert world.states() == [S.COMPLETED] * 2
+    check(
+        world,
+        f"""
+TASK_MOVE 0.3 & until 1 COMPLETED : ACCEPTED
+wait {pause} & TASK_MOVE 0.3 0 0 2 & idle 2 : ACCEPTED task 1: COMPLETED / task 2: COMPLETED
+""",
+    )
     assert world.events(QueuePaused) == []
 
 
@@ -48,55 +49,47 @@ def test_a_rover_that_is_handed_back_is_kept_standing_for_the_next_task(
 
 
 @for_each("after", [0.1, 0.3, 0.5, 1.3])
-@for_each("how", ["pause", "hold"])
+@for_each("halt", ["PAUSE", "DO_SET_MODE 1 4 to=autopilot"])
 def test_continue_soon_after_a_pause_goes_on_to_the_same_end(
-    world: World, how: str, after: float
+    world: World, halt: str, after: float
 ) -> None:
-    world.client.move(1.5)
-    world.until_state(1, S.EXECUTING)
-    world.run(1.0)
-    if how == "pause":
-        world.client.pause()
-    else:
-        world.client.command(176, 1, HOLD, target=(1, 1))
-    world.run(after)
-    world.client.proceed()
-    world.until_idle(tasks=1)
-    assert near_pose(world.pose(), (1.5, 0.0, 0.0))
+    check(
+        world,
+        f"""
+TASK_MOVE 1.5 & until 1 EXECUTING : ACCEPTED
+wait 1 : -
+{halt} & wait {after} & CONTINUE & idle 1 : ACCEPTED+ACCEPTED at=1.5,0,0
+""",
+    )
     assert [e.reason for e in world.events(QueuePaused)] == [R.OPERATOR]
 
 
 @for_each("after", [0.1, 0.3, 0.5, 1.5])
 def test_continue_soon_after_stop_lets_the_next_task_run(world: World, after: float) -> None:
-    world.client.move(20)
-    world.until_state(1, S.EXECUTING)
-    waiting = world.client.move(0.3)
-    world.run(1.0)
-    world.client.stop()
-    world.run(after)
-    world.client.proceed()
-    world.until_idle(tasks=2)
-    assert waiting.task_id == 2
-    assert world.states() == [S.KILLED, S.COMPLETED]
+    check(
+        world,
+        f"""
+TASK_MOVE 20 & until 1 EXECUTING : ACCEPTED
+TASK_MOVE 0.3 & wait 1 : ACCEPTED #2
+TASK_STOP & wait {after} & CONTINUE & idle 2 : ACCEPTED+ACCEPTED \
+task 1: KILLED / task 2: COMPLETED
+""",
+    )
 
 
-@for_each("who", ["client", "operator"])
+@for_each(
+    "who, reason",
+    [("COMPONENT_ARM_DISARM 0 to=autopilot", R.OPERATOR), ("operator disarms", R.TAKEOVER)],
+)
 def test_a_rover_disarmed_while_driving_does_not_drive_off_when_armed_again(
-    world: World, who: str
+    world: World, who: str, reason: R
 ) -> None:
-    world.client.move(20, speed=1.0)
-    world.until_state(1, S.EXECUTING)
-    world.run(3.0)
-    if who == "client":
-        assert world.client.command(400, 0, target=(1, 1)).message.command == 400
-    else:
-        world.operator_arm(False)
+    check(world, "TASK_MOVE 20 1 & until 1 EXECUTING : ACCEPTED\nwait 3 : -")
+    ask(world, who)
     world.until(world.stands, within=6)
     where = world.pose()
-    world.operator_arm(True)
-    world.run(4.0)
+    check(world, f"operator arms & wait 4 : - task 1: PAUSED {reason.name}")
     assert near_pose(world.pose(), where)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR if who == "client" else R.TAKEOVER)
 
 
 @for_each("persona", [ARDUPILOT, PX4])

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from mav_tasks.config.settings import Roles, Settings
 from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, Mode, Persona
+from rover_sim.personas import ARDUPILOT, Persona
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
@@ -21,6 +21,7 @@ from tests.kit.client import (
 )
 from tests.kit.client import HOLD as AP_HOLD
 from tests.kit.px4 import HOLD, MISSION, OFFBOARD, PROMPT_PX4, REPOSITION, RETURN, ask_mode
+from tests.kit.rows import check
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -93,10 +94,7 @@ def test_a_queue_that_is_cleared_leaves_no_velocity_of_the_clients_behind(
     make_world: MakeWorld,
 ) -> None:
     world = drives(make_world, AP)
-    world.client.command(54011, 1)
-    world.run(1.5)
-    assert world.stands()
-    assert world.mode() is Mode.HOLD
+    check(world, "TASK_CLEAR 1 & wait 1.5 : ACCEPTED it STANDS / mode hold")
 
 
 def end_of_server(world: World) -> None:

@@ -8,7 +8,8 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, HOLD, PAUSE_CONTINUE, set_mode
+from tests.kit.client import HOLD, set_mode
+from tests.kit.rows import check
 from tests.kit.world import OFF, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -47,43 +48,33 @@ def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str
 def test_pausing_an_idle_armed_rover_keeps_what_is_submitted_then(
     make_world: MakeWorld, persona: Persona
 ) -> None:
-    world = make_world(persona=persona)
-    world.operator_mode(Mode.HOLD)
-    world.client.arm()
-    world.until(lambda: world.is_armed, within=5)
-    assert (world.is_armed, world.mode()) == (True, Mode.HOLD)
-    paused = world.client.pause()
-    world.run(2)
-    assert paused.answer == (ACCEPTED, 0)
-    assert world.paused() is R.OPERATOR
-    where, sent = world.pose(), world.client.move(1)
-    world.run(5)
-    assert world.state(sent.task_id) == (S.QUEUED, R.NONE)
-    assert world.client.statuses(sent.task_id)[-1].why == (S.QUEUED, R.QUEUE_PAUSED)
-    assert near_pose(world.pose(), where)
-
-    world.client.proceed()
-    world.until_idle(tasks=1)
-    assert world.state(sent.task_id)[0] is S.COMPLETED
+    check(
+        make_world(persona=persona),
+        """
+operator hold & ARM 1 & wait 1.5 : ACCEPTED it is ARMED / mode hold
+PAUSE & wait 2 : ACCEPTED #0 / queue OPERATOR
+TASK_MOVE 1 & wait 5 : ACCEPTED #1 / task 1: QUEUED / status 1: QUEUED QUEUE_PAUSED / at=0,0,0
+CONTINUE & idle 1 : ACCEPTED task 1: COMPLETED
+""",
+    )
 
 
 def test_neither_0_nor_1_is_denied(world: World) -> None:
-    for value in (2.0, -1.0, float("nan"), float("inf")):
-        world.client.command(PAUSE_CONTINUE, value)
-    world.run(0.1)
-    assert world.client.acks_of(PAUSE_CONTINUE) == [(DENIED, R.BAD_PARAMETER)] * 4
+    table = "".join(f"DO_PAUSE_CONTINUE {value} : DENIED #BAD\n" for value in (2, -1, "nan", "inf"))
+    check(world, table.replace("BAD", f"{R.BAD_PARAMETER}"))
 
 
 def test_a_pause_while_starting_resumes(world: World) -> None:
     world.client.move(1)
     world.run(0.012)
     assert world.state(1)[0] is S.STARTING
-    world.client.pause()
-    world.run(3)
-    assert (world.state(1), world.control()) == ((S.PAUSED, R.OPERATOR), "IDLE")
-    world.client.proceed()
-    world.until_idle(tasks=1)
-    assert near_pose(world.pose(), (1.0, 0.0, 0.0))
+    check(
+        world,
+        """
+PAUSE & wait 2.6 : ACCEPTED task 1: PAUSED OPERATOR / it is IDLE
+CONTINUE & idle 1 : ACCEPTED at=1,0,0
+""",
+    )
 
 
 # no ground station is heard any more
@@ -120,7 +111,4 @@ def test_the_rover_stands_and_goes_on_only_when_told(make_world: MakeWorld) -> N
 def test_a_script_without_heartbeats_is_no_operator(make_world: MakeWorld) -> None:
     world = make_world(settings=PAUSE)
     world.client.heartbeats = False
-    world.run(LIMIT + 1)
-    sent = world.client.move(3)
-    world.until_idle(tasks=1)
-    assert (sent.answer, world.state(1)[0]) == ((ACCEPTED, 1), S.COMPLETED)
+    check(world, f"wait {LIMIT + 1} : -\nTASK_MOVE 3 & idle 1 : ACCEPTED #1 / task 1: COMPLETED")

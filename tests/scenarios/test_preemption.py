@@ -5,89 +5,79 @@ from random import Random
 
 from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.tasks.events import TaskChanged
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import MOVE, ROTATE
+from tests.kit.rows import check
 from tests.kit.volume import tries
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_waiting import MODIFY, PREEMPTIBLE, PREEMPTIVE, START_DELAY, submit
 
 GAP = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
 
 
 def test_nothing_is_interrupted_by_default(world: World) -> None:
-    world.client.move(2)
-    world.run(3)
-    world.client.move(0.2, priority=10)
-    world.until_state(2, S.EXECUTING)
-    assert world.state(1)[0] is S.COMPLETED
+    check(
+        world,
+        """
+TASK_MOVE 2 & wait 3 : ACCEPTED
+TASK_MOVE 0.2 0 0 0 0 0 10 & until 2 EXECUTING : ACCEPTED task 1: COMPLETED
+""",
+    )
 
 
 def test_a_task_that_outranks_enough_interrupts_and_the_other_resumes(
     make_world: MakeWorld,
 ) -> None:
     world = make_world(settings=GAP)
-    world.client.move(3, priority=4)
-    world.run(4)
-    world.client.move(0.2, priority=6)
-    world.run(1)
-    assert world.state(1)[0] is S.EXECUTING
-    world.client.rotate(90, priority=7)
-    world.until_state(1, S.PAUSED)
-    assert world.state(1) == (S.PAUSED, R.PREEMPTED)
-    assert world.paused() is R.NONE
+    check(
+        world,
+        """
+TASK_MOVE 3 0 0 0 0 0 4 & wait 4 : ACCEPTED
+TASK_MOVE 0.2 0 0 0 0 0 6 & wait 1 : ACCEPTED task 1: EXECUTING
+TASK_ROTATE 90 0 0 0 0 0 7 & until 1 PAUSED : ACCEPTED task 1: PAUSED PREEMPTED / queue NONE
+""",
+    )
     assert 0 < world.shown(2).time_to_finish < world.shown(1).time_to_finish
-    world.until_idle(tasks=3)
+    check(world, "idle 3 : - at=3,0,0")
     ended = [e.task_id for e in world.events(TaskChanged) if e.new is S.COMPLETED]
     assert ended == [3, 2, 1]
-    assert world.states() == [S.COMPLETED] * 3
-    assert near_pose(world.pose(), (3.0, 0.0, 0.0))
 
 
-MARK, KEEP = (PREEMPTIVE, 1), (PREEMPTIBLE, 0)
+KEEP, MARK = "TASK_MODIFY {} 5 0 : ACCEPTED", "TASK_MODIFY {} 6 1 : ACCEPTED"
 
 
 @for_each(
-    "running, waiting, priority, interrupts",
+    "running, waiting, priority, becomes",
     [
-        (None, None, 8, True),
-        (None, None, 7, False),
-        (KEEP, None, 9, False),
-        (KEEP, MARK, 9, False),
-        (None, MARK, 1, True),
-        (MARK, MARK, 5, False),
-        (MARK, MARK, 6, True),
-        (MARK, None, 8, True),
+        ("", "", 8, "PAUSED PREEMPTED"),
+        ("", "", 7, "EXECUTING NONE"),
+        (KEEP, "", 9, "EXECUTING NONE"),
+        (KEEP, MARK, 9, "EXECUTING NONE"),
+        ("", MARK, 1, "PAUSED PREEMPTED"),
+        (MARK, MARK, 5, "EXECUTING NONE"),
+        (MARK, MARK, 6, "PAUSED PREEMPTED"),
+        (MARK, "", 8, "PAUSED PREEMPTED"),
     ],
 )
 def test_who_interrupts_whom(
-    make_world: MakeWorld,
-    running: tuple[int, int] | None,
-    waiting: tuple[int, int] | None,
-    priority: int,
-    interrupts: bool,
+    make_world: MakeWorld, running: str, waiting: str, priority: int, becomes: str
 ) -> None:
     """By priorities, three apart, and by what each was modified to; not by an inherited rank."""
     world = make_world(settings=GAP)
-    world.client.pause()
-    world.run(0.1)
-    for task, (distance, own, mark) in enumerate(((3.0, 5, running), (0.2, priority, waiting)), 1):
-        world.client.move(distance, priority=own)
-        world.run(0.05)
-        if task == 2:
-            world.client.command(MODIFY, task, START_DELAY, 4.0)
-        if mark is not None:
-            world.client.command(MODIFY, task, *mark)
-        world.run(0.1)
-    submit(world, after=2, priority=10)
-    world.client.proceed()
-    world.run(3)
-    assert world.state(1)[0] is S.EXECUTING
-    world.run(2)
-    assert world.state(1) == ((S.PAUSED, R.PREEMPTED) if interrupts else (S.EXECUTING, R.NONE))
+    rows = f"""
+PAUSE : ACCEPTED
+TASK_MOVE 3 0 0 0 0 0 5 : ACCEPTED #1
+{running.format(1)}
+TASK_MOVE 0.2 0 0 0 0 0 {priority} : ACCEPTED #2
+TASK_MODIFY 2 2 4 : ACCEPTED
+{waiting.format(2)}
+TASK_MOVE 0.2 0 0 0 2 0 10 : ACCEPTED #3
+CONTINUE & wait 2.4 : ACCEPTED task 1: EXECUTING
+wait 2.4 : - task 1: {becomes}
+"""
+    check(world, rows.replace("\n\n", "\n"))
 
 
 @for_each("goal", ["move", "back", "rotate", "turns"])

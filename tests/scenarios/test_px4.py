@@ -8,14 +8,12 @@ import pytest
 from pymavlink.dialects.v20 import common
 from pymavlink.generator.mavcrc import x25crc
 
-from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED
 from tests.kit.mission import reached
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, go_to
 from tests.kit.rows import check
@@ -23,6 +21,7 @@ from tests.kit.world import World, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 DRIVE = 54002
+WAITS = "waits: it might drive on without setpoints"
 
 every = for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
@@ -82,12 +81,12 @@ class TestDriving:
     @every
     def test_a_plan_is_driven(self, make_world: MakeWorld, persona: Persona) -> None:
         world = make_world(persona=persona)
-        plan = "mission; TO=1.5,0; TO=1.5,1.5; TO=0,1.5; TO=0,0 : ACCEPTED"
-        check(world, plan.replace("TO=", "NAV_WAYPOINT at="))
-        check(world, "MISSION_START to=autopilot : ACCEPTED #1")
-        world.until_state(1, S.COMPLETED, within=90)
+        table = """
+    mission; TO=1.5,0; TO=1.5,1.5; TO=0,1.5; TO=0,0 : ACCEPTED
+    MISSION_START to=autopilot & until 1 COMPLETED within=90 : ACCEPTED #1 / at=0,0,-90
+    """
+        check(world, table.replace("TO=", "NAV_WAYPOINT at="))
         assert reached(world.client) == [0, 1, 2, 3], "no item is home"
-        assert is_at(world, 0.0, 0.0)
 
 
 class TestTurning:
@@ -96,20 +95,15 @@ class TestTurning:
     @for_each("angle", [90.0, -45.0, 170.0, -270.0, 400.0])
     def test_by_an_angle(self, world: World, angle: float) -> None:
         world.run(2.0)  # until it has said that it can
-        world.client.rotate(angle)
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
-        assert near_pose(world.pose(), (0.0, 0.0, angle))
+        check(world, f"TASK_ROTATE {angle} & idle 1 : ACCEPTED task 1: COMPLETED / at=0,0,{angle}")
 
     def test_it_goes_on_with_a_turn_where_somebody_has_carried_it(self, world: World) -> None:
-        world.run(2.0)
-        world.client.rotate(150.0)
-        world.until(lambda: world.truth.yaw > 0.7, within=9)
-        world.client.pause()
-        world.run(3.0)
+        check(
+            world,
+            "wait 2 : -\nTASK_ROTATE 150 & wait 3 : ACCEPTED it MOVES\nPAUSE & wait 3 : ACCEPTED",
+        )
         world.rover.push(0.1, 0.0, 0.0)
-        world.client.proceed()
-        world.until_state(1, S.COMPLETED)
+        check(world, "CONTINUE & until 1 COMPLETED : ACCEPTED")
 
 
 class TestMovingBackwards:
@@ -162,55 +156,45 @@ NAV_SET_YAW_SPEED 90 -0.5 : REFUSED / reverse
     assert world.tasks() == ()
 
 
-class TestStop:
-    @every
-    def test_ends_a_drive(self, make_world: MakeWorld, persona: Persona) -> None:
-        world = make_world(persona=persona)
-        world.client.move(20, speed=1.0)
-        world.until_faster(0.8)
-        sent = world.client.stop()
-        world.run(4)
-        assert sent.answer == (ACCEPTED, 1)
-        assert world.stands()
-        assert world.mode() is Mode.HOLD
-        assert world.control() == "IDLE"
+@every
+def test_stop_ends_a_drive(make_world: MakeWorld, persona: Persona) -> None:
+    check(
+        make_world(persona=persona),
+        """
+TASK_MOVE 20 1 & faster 0.8 : ACCEPTED
+TASK_STOP & wait 4 : ACCEPTED #1 / it STANDS / mode hold / it is IDLE
+""",
+    )
 
 
 class TestOneThatWouldDriveByItselfWithoutUs:
     """By its offboard-loss failsafe: nobody could stop it if the server went away."""
 
-    def make(self, make_world: MakeWorld, settings: Settings | None = None) -> World:
-        world = make_world(persona=PROMPT_PX4, settings=settings)
+    def test_its_tasks_wait_and_say_why_and_what_cures_it(self, make_world: MakeWorld) -> None:
+        world = make_world(persona=PROMPT_PX4)
         world.client.send(set_action(3))
-        world.run(0.2)
-        return world
-
-    def test_it_is_told_with_the_command_that_cures_it(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world)
-        said = " ".join(world.client.texts())
-        assert "COM_OBL_RC_ACT is 3: Return, it drives home" in said
-        assert "To make it stop: mav-tasks probe --set-failsafe" in said
-
-    def test_its_tasks_wait_and_say_why(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world)
-        sent = world.client.move(1)
-        world.run(5)
-        assert sent.answer == (ACCEPTED, 1)
-        assert world.state(1) == (S.QUEUED, R.NONE)
-        assert world.shown(1).reason == R.LOSS_FAILSAFE
-        assert world.client.said("waits: it might drive on without setpoints")
-        assert not world.is_armed
+        check(
+            world,
+            f"""
+    wait 0.2 : - COM_OBL_RC_ACT is 3: Return, it drives home / stop: mav-tasks probe --set-failsafe
+    TASK_MOVE 1 & wait 5 : ACCEPTED #1 / task 1: QUEUED NONE / {WAITS}
+    SHOW 1 : ACCEPTED status 1: QUEUED LOSS_FAILSAFE / it is DISARMED
+    """,
+        )
 
     def test_one_that_never_says_what_it_does_is_driven_after_it_was_asked_for_a_while(
         self, make_world: MakeWorld
     ) -> None:
         said = tuple(each for each in PX4.parameters if each.name != "COM_OBL_RC_ACT")
         world = make_world(persona=replace(PROMPT_PX4, parameters=said))
-        world.client.move(1)
-        world.run(1)
-        assert world.shown(1).reason == R.LOSS_FAILSAFE
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
+        check(
+            world,
+            """
+    TASK_MOVE 1 & wait 1 : ACCEPTED
+    SHOW 1 : ACCEPTED status 1: QUEUED LOSS_FAILSAFE
+    idle 1 : - task 1: COMPLETED
+    """,
+        )
 
 
 def set_action(action: int) -> common.MAVLink_param_set_message:

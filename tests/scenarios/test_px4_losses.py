@@ -7,12 +7,11 @@ from typing import Any
 
 from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.events import VehicleNoted
-from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode
 from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4, SET_MODE
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import check
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import COMMAND_ID, MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
@@ -34,18 +33,15 @@ def is_mode_request(data: bytes) -> bool:
 
 @for_each("lost", [1.0, 5.0])
 def test_a_server_that_is_started_again_leaves_it_standing(
-    make_world: MakeWorld, tmp_path: Path, lost: float
+    make_world: MakeWorld, path: Path, lost: float
 ) -> None:
-    path = tmp_path / "tasks.sqlite3"
     store = PromptSqliteStore(path, wall_offset=UTC)
     world = driving(make_world, store=store, lost=lost)
     restart(world, path, away=lost + 4, settles=0.0)
     assert world.stands()
     where = world.truth.north
-    world.run(10)
+    check(world, "wait 10 : - it STANDS / queue RESTARTED")
     assert abs(world.truth.north - where) < 0.1
-    assert world.stands()
-    assert world.paused() is R.RESTARTED
 
 
 @for_each("lost", [1.0, 5.0])
@@ -82,10 +78,7 @@ def test_a_server_that_stalls_while_zeros_stream_begins_that_again(make_world: M
     world = make_world(persona=PROMPT_PX4)
     world.client.move(2)
     world.until(lambda: world.control() == "LEADING_IN", within=5)
-    world.run(0.3)
-    world.suspend_server(0.4)
-    world.run(8)
-    assert world.state(1)[0] in (S.EXECUTING, S.COMPLETED)
+    check(world, "wait 0.3 & sleep 0.4 & until 1 EXECUTING within=8 : -")
 
 
 def test_a_server_that_is_started_while_it_drives_home_sends_it_no_setpoint(

@@ -10,7 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, MOVE, TEMPORARILY_REJECTED
+from tests.kit.client import ACCEPTED, MOVE
 from tests.kit.mission import Download, reached
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import check
@@ -20,7 +20,6 @@ from tests.scenarios.conftest import MakeWorld
 
 VERSION = 148  # AUTOPILOT_VERSION
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
-RETURN = 11  # the mode
 
 
 @anew
@@ -83,56 +82,51 @@ def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, 
 def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
     world: World, path: Path
 ) -> None:
-    world.client.move(2, priority=1)
-    world.run(3)
-    world.client.rotate(90, priority=8)
-    world.until_state(2, S.EXECUTING)
-    world.run(0.5)
-    world.client.pause()
-    world.run(2)
+    check(
+        world,
+        """
+TASK_MOVE 2 0 0 0 0 0 1 & wait 3 : ACCEPTED
+TASK_ROTATE 90 0 0 0 0 0 8 & until 2 EXECUTING : ACCEPTED
+wait 0.5 & PAUSE & wait 2 : ACCEPTED
+""",
+    )
     restart(world, path)
-    assert [world.state(i) for i in (1, 2)] == [(S.PAUSED, R.PREEMPTED), (S.PAUSED, R.OPERATOR)]
-    assert world.paused() is R.OPERATOR
-    world.client.proceed()
-    world.until_idle(tasks=2)
-    assert world.states() == [S.COMPLETED] * 2
-    assert near_pose(world.pose(), (2.0, 0.0, 0.0))
+    check(
+        world,
+        """
+wait 0 : - task 1: PAUSED PREEMPTED / task 2: PAUSED OPERATOR / queue OPERATOR
+CONTINUE & idle 2 : ACCEPTED task 1: COMPLETED / task 2: COMPLETED / at=2,0,0
+""",
+    )
 
 
 def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
     world: World, path: Path
 ) -> None:
-    world.client.move(2)
-    world.run(3)
-    world.client.pause()
-    world.run(3)
-    world.rover.autopilot.reboot(now=world.now)
+    check(world, "TASK_MOVE 2 & wait 3 : ACCEPTED\nPAUSE & wait 3 & reboot & wait 0 : ACCEPTED")
     restart(world, path, well=True, away=8.0)
-    world.operator_mode(Mode.HOLD)
-    world.run(1)
-    world.client.proceed()
-    world.run(1)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    check(
+        world, "operator hold & wait 1 : -\nCONTINUE & wait 1 : ACCEPTED task 1: HELD FRAME_RESET"
+    )
 
 
 @for_each("is_restarted", [False, True])
 def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
     world: World, path: Path, *, is_restarted: bool
 ) -> None:
-    world.client.move(2)
-    world.run(3)
-    world.operator_arm(False)
-    world.run(1)
-    world.operator_mode(Mode.HOLD)
-    world.run(1)
+    check(
+        world,
+        "TASK_MOVE 2 & wait 3 : ACCEPTED\noperator disarms & wait 1 & operator hold & wait 1 : -",
+    )
     if is_restarted:
         restart(world, path)
-    at_once = world.client.mode(RETURN)
-    world.run(2)
-    assert at_once.answer == (TEMPORARILY_REJECTED, R.DISARMED)
-    assert not world.is_armed
-    assert world.client.proceed()
-    world.until_state(1, S.COMPLETED)
+    check(
+        world,
+        f"""
+DO_SET_MODE 1 11 to=autopilot & wait 2 : BUSY #{R.DISARMED} / it is DISARMED
+CONTINUE & until 1 COMPLETED : ACCEPTED
+""",
+    )
 
 
 @for_each("answers_lost", [0, 1, 1000])

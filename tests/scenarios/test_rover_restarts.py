@@ -9,7 +9,7 @@ from rover_sim.personas import PX4, Mode, Persona
 from tests.kit import px4
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, Sent
-from tests.kit.rows import ask
+from tests.kit.rows import ask, check
 from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -17,6 +17,7 @@ RELEASE, AGAIN, REMAINDER = 54013, 0, 1
 POSITION = 32
 MAKES = [PROMPT, px4.PROMPT_PX4]
 UP = 6.0  # s, until a rover that restarts has shown everything
+PARKED = "reboot & wait 6 & operator hold & wait 1 & operator manual & wait 1"
 
 
 @anew
@@ -48,18 +49,16 @@ def proceed(world: World) -> Sent:
 
 @for_each("persona", MAKES)
 def test_it_is_told_what_to_do_and_positions_come_as_before(driving: World) -> None:
-    world, at = driving, driving.now
-    restart(world)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    assert world.paused() is R.RESTARTED, "nobody took it over"
+    world, at = driving, driving.now  # nobody took it over
+    held = 'Press "Held: remainder", "Held: again" or "Held: skip", then Continue'
+    check(
+        world,
+        f"""
+reboot & wait 6 : - task 1: HELD FRAME_RESET / queue RESTARTED / !taken over / \
+Queue paused: after a restart. Press Continue / Rover 1 restarted: task 1 is held. {held}
+""",
+    )
     assert sum(1.5 < p.at - at < 2.5 for p in world.client.of_id(POSITION)) >= 10
-    texts = world.client.texts()
-    assert not any("taken over" in text for text in texts)
-    assert "Queue paused: after a restart. Press Continue" in texts
-    assert (
-        "Rover 1 restarted: task 1 is held. Press"
-        ' "Held: remainder", "Held: again" or "Held: skip", then Continue'
-    ) in texts
 
 
 @for_each("persona", MAKES)
@@ -69,32 +68,31 @@ def test_release_and_continue(driving: World, how: int) -> None:
     restart(world)
     where = world.truth.north
     left = 4.0 if how == AGAIN else 4.0 - where
-    assert release(world, how).answer == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED)
+    check(world, f"TASK_RELEASE 0 {how} & until 1 COMPLETED : ACCEPTED #1")
     assert world.truth.north == pytest.approx(where + left, abs=0.15)
-    world.run(3)
-    assert world.state(2) == (S.QUEUED, R.NONE), "the queue waits for the word"
-    assert proceed(world).result == ACCEPTED
-    world.until_idle(tasks=2)
-    assert world.state(2)[0] is S.COMPLETED
+    check(
+        world,
+        """
+wait 3 : - task 2: QUEUED NONE
+CONTINUE & idle 2 : ACCEPTED task 2: COMPLETED
+""",
+    )
 
 
 @for_each("persona", MAKES)
-@for_each("order", ["release first", "continue between"])
-def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str) -> None:
-    world = driving
-    world.fault(Faults(withheld=frozenset({POSITION})))
-    restart(world, up=4)
-    world.until_state(1, S.HELD, within=3)
-    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
-    if order == "continue between":
-        assert proceed(world).result == ACCEPTED
-    world.run(10)
-    assert world.state(1)[0] is S.HELD
-    assert "Task 1 waits: no valid position" in world.client.texts()
-    assert world.shown(1).why == (S.HELD, R.NO_POSITION)
-    world.fault(Faults())
-    world.until_state(1, S.COMPLETED)
+@for_each("word", ["wait 0.4 : -", "CONTINUE : ACCEPTED"])
+def test_a_release_while_it_boots_waits_and_says_why(driving: World, word: str) -> None:
+    check(
+        driving,
+        f"""
+fault withheld=32,32 & reboot & until 1 HELD within=7 : -
+TASK_RELEASE 0 1 : ACCEPTED #1 / Task 1 waits: no valid position
+{word}
+wait 10 : - task 1: HELD
+SHOW 1 : ACCEPTED status 1: HELD NO_POSITION
+fault & until 1 COMPLETED : -
+""",
+    )
 
 
 HALTS = "DO_PAUSE_CONTINUE 0, TASK_STOP, TASK_CANCEL 1, operator auto, a restart"
@@ -122,47 +120,30 @@ def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
 
 
 @for_each("persona", MAKES)
-@for_each("is_first", [True, False])
-def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_first: bool) -> None:
+@for_each("person", ["operator disarms & wait 2 & reboot & wait 6", PARKED])
+def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, person: str) -> None:
     world = driving
-    if is_first:
-        world.operator_arm(False)
-        world.run(2)
-        restart(world)
-    else:
-        restart(world)
-        world.operator_mode(Mode.HOLD)
-        world.run(1)
-        world.operator_mode(Mode.MANUAL)
-        world.run(1)
+    check(world, f"{person} : - task 1: HELD FRAME_RESET")
     at = world.now
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
-    world.run(3)
+    check(world, "TASK_RELEASE 0 1 & wait 3 : ACCEPTED #1 / task 1: HELD")
     assert "arm" not in world.observer.sent_since(at)
-    assert world.state(1)[0] is S.HELD
-    assert proceed(world).result == ACCEPTED
-    world.until_idle(tasks=2)
-    assert world.states() == [S.COMPLETED] * 2
+    check(world, "CONTINUE & idle 2 : ACCEPTED task 1: COMPLETED / task 2: COMPLETED")
 
 
 def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
     make_world: MakeWorld,
 ) -> None:
     """A PX4's mode is in its next heartbeat, up to a second after its positions began anew."""
-    world = make_world(persona=PX4)
-    world.client.move(4)
-    world.until_faster(0.4)
-    world.fault(Faults(withheld=frozenset({0})))  # its heartbeat comes last
-    restart(world, up=2.0)
-    world.fault(Faults())
-    world.run(UP)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    assert world.paused() is R.RESTARTED
-    assert not world.client.said("taken over")
-    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
-    proceed(world)
-    world.until_state(1, S.COMPLETED, within=60)
+    check(
+        make_world(persona=PX4),
+        """
+TASK_MOVE 4 & faster 0.4 : ACCEPTED
+fault withheld=0,0 & reboot & wait 2 : - !taken over
+fault & wait 6 : - task 1: HELD FRAME_RESET / queue RESTARTED / !taken over
+TASK_RELEASE 0 1 : ACCEPTED #1
+CONTINUE & until 1 COMPLETED within=60 : ACCEPTED
+""",
+    )
 
 
 EVERYTHING, ALL_BUT_HEARTBEATS = frozenset(range(300)), frozenset(range(1, 300))
@@ -182,9 +163,7 @@ def idle(make_world: MakeWorld, persona: Persona) -> World:
 @for_each("persona", MAKES)
 def test_after_a_restart_while_a_task_is_being_cancelled_the_next_one_waits(driving: World) -> None:
     world, at = driving, driving.now
-    ask(world, "TASK_CANCEL 1")
-    restart(world, up=20)
-    assert world.state(1) == (S.CANCELLED, R.CANCELLED)
+    check(world, "TASK_CANCEL 1 & reboot & wait 20 : ACCEPTED task 1: CANCELLED CANCELLED")
     # a PX4 shows HOLD before its clock tells of the restart, and nothing is left to set that right
     assert world.paused() in (R.RESTARTED, R.TAKEOVER)
     assert "arm" not in world.observer.sent_since(at)

@@ -6,15 +6,11 @@ from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import anew, for_each
-from tests.kit.client import (
-    ACCEPTED,
-    DENIED,
-    MOVE,
-    TEMPORARILY_REJECTED,
-    command_long,
-)
+from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
+
+REPEATED = "repeated command, no new task: see task 1"
 
 
 @anew
@@ -26,90 +22,76 @@ def paused(world: World) -> World:
 
 
 def test_the_very_same_packet_gets_the_same_answer(paused: World) -> None:
-    paused.client.move(1)
-    paused.run(0.05)
-    packet = paused.client.send(command_long(MOVE, 2.0))
-    for pause in (0.1, 0.4, 3.0):
-        paused.run(pause)
-        paused.client.send_raw(packet)
-    paused.run(0.1)
-    assert paused.client.acks_of(MOVE) == [(ACCEPTED, 1)] + [(ACCEPTED, 2)] * 4
+    check(
+        paused,
+        """
+TASK_MOVE 1 & wait 0.05 : ACCEPTED #1
+TASK_MOVE 2 & wait 0.1 & again & wait 0.4 & again & wait 3 & again : ACCEPTED+ACCEPTED+ACCEPTED+OK
+""".replace("OK", "ACCEPTED #2 / !#1"),
+    )
     assert len(paused.tasks()) == 2
 
 
 def test_a_nonce_names_a_task_for_good(paused: World) -> None:
-    first = paused.client.move(1, nonce=5)
-    paused.run(30)
-    again = paused.client.move(1, nonce=5)
-    paused.run(0.1)
-    other = paused.client.move(2, nonce=5)
-    paused.run(0.1)
-    fresh = paused.client.move(1, nonce=6)
-    paused.run(0.1)
-    assert [s.answer for s in (first, again, other, fresh)] == [
-        (ACCEPTED, 1),
-        (ACCEPTED, 1),
-        (DENIED, R.NONCE_REUSED),
-        (ACCEPTED, 2),
-    ]
+    check(
+        paused,
+        f"""
+TASK_MOVE 1 0 0 5 & wait 30 : ACCEPTED #1
+TASK_MOVE 1 0 0 5 : ACCEPTED #1
+TASK_MOVE 2 0 0 5 : DENIED #{R.NONCE_REUSED}
+TASK_MOVE 1 0 0 6 : ACCEPTED #2
+""",
+    )
 
 
 def test_a_nonce_counts_from_another_port_of_the_same_address_too(paused: World) -> None:
-    first = paused.client.move(1, nonce=5)
-    paused.run(0.1)
-    elsewhere = paused.add_client("elsewhere")
-    again = elsewhere.move(1, nonce=5)
-    stranger = paused.add_client("stranger", system_id=7)
-    own = stranger.move(1, nonce=5)
-    paused.run(0.1)
-    assert [s.task_id for s in (first, again, own)] == [1, 1, 2]
+    check(
+        paused,
+        """
+TASK_MOVE 1 0 0 5 : ACCEPTED #1
+elsewhere> TASK_MOVE 1 0 0 5 : ACCEPTED #1
+stranger> TASK_MOVE 1 0 0 5 : ACCEPTED #2
+""",
+        elsewhere=paused.add_client("elsewhere"),
+        stranger=paused.add_client("stranger", system_id=7),
+    )
 
 
 @for_each("after, task_id", [(2.4, 1), (9.9, 1), (10.1, 2)])
 def test_confirmation_above_0_is_a_repeat_for_10_s(
     paused: World, after: float, task_id: int
 ) -> None:
-    paused.client.move(1)
-    paused.run(after)
-    again = paused.client.move(1, confirmation=1)
-    paused.run(0.1)
-    assert again.task_id == task_id
+    again = f"TASK_MOVE 1 confirmation=1 : ACCEPTED #{task_id}"
+    check(paused, f"TASK_MOVE 1 & wait {after} : ACCEPTED\n{again}")
 
 
-@for_each("after, task_id", [(2.4, 1), (2.6, 2)])
-def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, task_id: int) -> None:
-    paused.client.move(1)
-    paused.run(after)
-    again = paused.client.move(1)
-    paused.run(0.1)
-    assert again.task_id == task_id
-    told = [text for text in paused.client.texts() if "repeated command" in text]
-    assert told == ["repeated command, no new task: see task 1, queued"] * (2 - task_id)
+@for_each("after, told", [(2.4, f"#1 / {REPEATED}, queued"), (2.6, f"#2 / !{REPEATED}")])
+def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, told: str) -> None:
+    check(paused, f"TASK_MOVE 1 & wait {after} : ACCEPTED\nTASK_MOVE 1 : ACCEPTED {told}")
 
 
 def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:
-    ids = []
-    for distance in (1.0, 2.0, 1.0):
-        sent = paused.client.move(distance)
-        paused.run(0.1)
-        ids.append(sent.task_id)
-    assert ids == [1, 2, 3]
+    check(
+        paused,
+        """
+TASK_MOVE 1 : ACCEPTED #1
+TASK_MOVE 2 : ACCEPTED #2
+TASK_MOVE 1 : ACCEPTED #3
+""",
+    )
 
 
 def test_what_was_refused_can_be_tried_again_at_once(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(queueing=Queueing(capacity=1)))
-    world.client.stop()
-    world.run(0.5)
-    world.client.move(1)
-    world.run(0.1)
-    refused = world.client.rotate(20)
-    world.run(0.1)
-    assert refused.answer == (TEMPORARILY_REJECTED, R.QUEUE_FULL)
-    world.client.proceed()
-    world.until_idle(tasks=1)
-    again = world.client.rotate(20)
-    world.run(0.1)
-    assert again.answer == (ACCEPTED, 2)
+    check(
+        make_world(settings=Settings(queueing=Queueing(capacity=1))),
+        f"""
+TASK_STOP : ACCEPTED
+TASK_MOVE 1 : ACCEPTED
+TASK_ROTATE 20 : BUSY #{R.QUEUE_FULL}
+CONTINUE & idle 1 : ACCEPTED
+TASK_ROTATE 20 : ACCEPTED #2
+""",
+    )
 
 
 def test_each_command_is_answered_once_in_time_and_never_later(world: World) -> None:

@@ -15,6 +15,7 @@ from mav_tasks.tasks.task import Task
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, Sent
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import check
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -149,15 +150,16 @@ def test_cancelling_the_series_ends_it_by_the_id_of_any_run(world: World, named:
     task = every(world, 20)
     world.run(45)
     present = waiting(world)[0].id
-    sent = world.client.command(CANCEL, task if named == "first" else present, 0, 1)
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, present)
-    assert world.state(present) == (S.CANCELLED, R.CANCELLED)
-    world.run(60)
+    check(
+        world,
+        f"""
+TASK_CANCEL {task if named == "first" else present} 0 1 : ACCEPTED #{present} / \
+task {present}: CANCELLED CANCELLED
+wait 60 : -
+TASK_CANCEL {task} 0 1 : DENIED #{R.WRONG_STATE}
+""",
+    )
     assert waiting(world) == []
-    again = world.client.command(CANCEL, task, 0, 1)
-    world.run(0.1)
-    assert again.answer == (DENIED, R.WRONG_STATE)
 
 
 @for_each("state", [S.SCHEDULED, S.EXECUTING])
@@ -165,14 +167,10 @@ def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     """Hours after it, and long after a resume, nothing may start by itself."""
     task = every(world, 30, distance=2.0, delay=10 if state is S.SCHEDULED else 0)
     world.until_state(task, state)
-    world.client.stop()
-    world.run(0.1)
-    assert world.state(task) == (S.KILLED, R.STOP)
+    check(world, f"TASK_STOP & wait 5 : ACCEPTED task {task}: KILLED STOP")
     assert noted(world)[-1] == f"will not repeat task {task}: STOP"
-    world.run(5)
-    world.client.proceed()
     count = len(world.tasks())
-    world.run(120)
+    check(world, "CONTINUE & wait 120 : ACCEPTED")
     assert len(world.tasks()) == count
     assert waiting(world) == []
 
@@ -212,12 +210,9 @@ def test_a_run_that_was_driven_at_a_crash_is_held_and_the_series_waits_for_it(
     task = every(world, 20, distance=3.0)
     world.run(3)
     restart(world, path)
-    assert world.state(task) == (S.HELD, R.OUTCOME_UNKNOWN)
-    world.run(40)
+    check(world, f"wait 40 : - task {task}: HELD OUTCOME_UNKNOWN")
     assert [each.id for each in runs(world)] == [task]
-    world.client.command(54013, task, 2)  # skip
-    world.run(0.2)
-    assert world.state(task) == (S.CANCELLED, R.SKIPPED)
+    check(world, f"TASK_RELEASE {task} 2 : ACCEPTED task {task}: CANCELLED SKIPPED")
     assert len(waiting(world)) == 1
 
 

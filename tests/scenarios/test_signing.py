@@ -13,6 +13,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import check
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -88,10 +89,8 @@ def test_where_signatures_are_asked_for_nothing_else_is_looked_at(world: World) 
 
 def test_where_they_are_not_asked_for_a_wrong_one_is_worse_than_none(world: World) -> None:
     put(world, ALICE, takes_unsigned=True)
-    wrong = signing(world, BOB, name="wrong").move(1.0)
-    unsigned = world.client.move(1.0)
-    world.run(0.2)
-    assert (wrong.ack, unsigned.result) == (None, ACCEPTED)
+    wrong = signing(world, BOB, name="wrong")
+    check(world, "wrong> TASK_MOVE 1 : -\nTASK_MOVE 1 : ACCEPTED", wrong=wrong)
 
 
 def test_without_a_key_ring_signatures_are_taken_off(world: World) -> None:
@@ -102,9 +101,7 @@ def test_without_a_key_ring_signatures_are_taken_off(world: World) -> None:
 
 def test_the_key_of_rovers_is_no_client_s(world: World) -> None:
     put(world, ALICE, ROVERS)
-    sent = signing(world, ROVERS).pause()
-    world.run(0.3)
-    assert sent.ack is None
+    check(world, "rover> PAUSE : -", rover=signing(world, ROVERS))
     assert counts(world)[1] >= 1
 
 
@@ -176,11 +173,12 @@ def test_nor_by_a_server_that_was_started_since(kept: World, path: Path, well: b
 
 def test_a_sender_heard_for_the_first_time_may_be_a_minute_behind(world: World) -> None:
     put(world, ALICE, BOB)
-    late = signing(world, ALICE, behind=MINUTE - 1.0, name="late")
-    later = signing(world, BOB, behind=MINUTE + 2.0, name="later")
-    sent = late.move(1.0), later.move(1.0)
-    world.run(0.3)
-    assert (sent[0].result, sent[1].ack) == (ACCEPTED, None)
+    check(
+        world,
+        "late> TASK_MOVE 1 : ACCEPTED\nlater> TASK_MOVE 1 : -",
+        late=signing(world, ALICE, behind=MINUTE - 1.0, name="late"),
+        later=signing(world, BOB, behind=MINUTE + 2.0, name="later"),
+    )
     assert counts(world)[2] >= 1
 
 
@@ -213,9 +211,7 @@ def test_a_revoked_key_is_nobody_s_at_once(world: World) -> None:
 
 def test_a_revoked_key_is_not_taken_for_no_signature(world: World) -> None:
     put(world, REVOKED, takes_unsigned=True)
-    sent = signing(world, ALICE).move(1.0)
-    world.run(0.3)
-    assert sent.ack is None
+    check(world, "alice> TASK_MOVE 1 : -", alice=signing(world, ALICE))
 
 
 def setup_message(secret: bytes) -> object:

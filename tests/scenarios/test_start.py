@@ -4,69 +4,54 @@ from mav_tasks.config.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import HOLD
+from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-
-POSITION = 32
 
 
 def test_with_arming_by_the_operator_a_task_waits_for_it(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(arming="operator"))
-    world.client.move(0.3)
-    world.run(3)
-    assert world.shown(1).why == (S.QUEUED, R.DISARMED)
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.until_idle(tasks=1)
-    sent = world.observer.sent_since(0)
-    assert "arm" not in sent
-    assert "disarm" not in sent
-    assert world.is_armed
+    check(
+        world,
+        """
+TASK_MOVE 0.3 & wait 3 : ACCEPTED
+SHOW 1 : ACCEPTED status 1: QUEUED DISARMED / it is DISARMED
+operator hold & operator arms & idle 1 : - it is ARMED
+""",
+    )
+    assert {"arm", "disarm"}.isdisjoint(world.observer.sent_since(0))
 
 
-@for_each("mode", [Mode.AUTO, Mode.RTL, Mode.GUIDED, Mode.MANUAL])
-def test_an_armed_rover_in_a_mode_that_is_not_ours_is_waited_for(world: World, mode: Mode) -> None:
-    world.operator_arm(True)
-    world.operator_mode(mode)
-    world.run(1)
+@for_each("mode", ["auto", "rtl", "guided", "manual"])
+def test_an_armed_rover_in_a_mode_that_is_not_ours_is_waited_for(world: World, mode: str) -> None:
+    check(world, f"operator arms & operator {mode} & wait 1 : -")
     at = world.now
-    world.client.move(0.3)
-    world.run(3)
-    assert world.shown(1).why == (S.QUEUED, R.WRONG_MODE)
-    assert [name for name in world.observer.sent_since(at) if name not in {"511", "512"}] == []
-    world.operator_mode(Mode.HOLD)
-    if mode is not Mode.GUIDED:  # in which nobody drives by hand
-        world.run(3)
-        assert world.paused() is R.TAKEOVER
-        world.client.proceed()
+    check(
+        world,
+        "TASK_MOVE 0.3 : ACCEPTED\nwait 2.2 : -\nSHOW 1 : ACCEPTED status 1: QUEUED WRONG_MODE",
+    )
+    assert {*world.observer.sent_since(at)} <= {"511", "512"}
+    check(world, "operator hold : -")
+    if mode != "guided":  # in which nobody drives by hand
+        check(world, "wait 2.2 : - queue TAKEOVER\nCONTINUE : ACCEPTED")
     world.until_idle(tasks=1)
 
 
-def test_without_position_a_task_waits(world: World) -> None:
-    world.fault(Faults(withheld=frozenset({POSITION})))
-    world.run(1)
-    world.client.move(0.3)
-    world.run(2)
-    assert world.shown(1).why == (S.QUEUED, R.NO_POSITION)
-    world.fault(Faults())
-    world.until_idle(tasks=1)
-
-
-def test_for_a_silent_rover_a_task_waits(world: World) -> None:
-    world.client.pause()
-    world.run(0.1)
-    world.client.move(0.3)
-    world.run(0.1)
-    world.fault(Faults(silent=True))
-    world.run(5)
-    world.client.proceed()
-    world.run(0.1)
-    assert world.shown(1).why == (S.QUEUED, R.VEHICLE_SILENT)
-    world.fault(Faults())
-    world.until_idle(tasks=1)
+@for_each("fault, reason", [("BLIND", "NO_POSITION"), ("fault silent=1", "VEHICLE_SILENT")])
+def test_without_position_or_heartbeats_a_task_waits(world: World, fault: str, reason: str) -> None:
+    check(
+        world,
+        f"""
+PAUSE : ACCEPTED
+TASK_MOVE 0.3 : ACCEPTED #1
+{fault} & wait 5 : -
+CONTINUE : ACCEPTED
+SHOW 1 : ACCEPTED status 1: QUEUED {reason}
+fault & idle 1 : -
+""",
+    )
 
 
 @for_each(
@@ -98,12 +83,9 @@ def test_a_refusal_fails_the_task_in_about_a_second_and_the_queue_goes_on(
 
 
 def test_a_rover_that_answers_nothing_fails_the_task(world: World) -> None:
-    world.fault(Faults(deaf=True))
-    at = world.now
-    world.client.move(0.3)
-    world.until_state(1, S.FAILED)
-    assert world.now - at < 6.0  # four times, each on a heartbeat that shows whose it is
-    assert world.state(1)[1] is R.MODE_REFUSED
+    """Asked four times, each on a heartbeat that shows whose it is."""
+    table = "fault deaf=1 & TASK_MOVE 0.3 & until 1 FAILED within=6 : ACCEPTED task 1: FAILED MODE_"
+    check(world, f"{table}REFUSED")
 
 
 def test_mode_zero_arm_zeros_motion(world: World) -> None:

@@ -6,7 +6,8 @@ from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, set_mode
 from tests.kit.mission import Item
-from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, ask_mode
+from tests.kit.px4 import HOLD, MISSION, PROMPT_PX4, ask_mode
+from tests.kit.rows import check
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
@@ -73,37 +74,37 @@ def test_armed_before_the_mode_starts(world: World, by: str) -> None:
 
 
 def test_armed_too_late_does_not_start(world: World) -> None:
-    ask_mode(world.client, MISSION)
-    world.run(10.1)
-    world.client.arm()
-    world.run(2)
-    assert waits_for_start(world)
+    check(
+        world,
+        """
+DO_SET_MODE 1 4 4 to=autopilot & wait 10.1 : ACCEPTED
+ARM 1 & wait 2 : ACCEPTED
+SHOW 1 : ACCEPTED status 1: BLOCKED WAITING_FOR_START
+""",
+    )
     assert shown(world) == HOLD
 
 
-@for_each("other", ["STOP", "pause", "HOLD", "another mode", "hold of another"])
+WISHES = """TASK_STOP & wait 1 & CONTINUE & wait 1 : ACCEPTED+ACCEPTED
+PAUSE & wait 0.2 & CONTINUE & wait 1 : ACCEPTED+ACCEPTED
+HOLD & wait 1 : ACCEPTED
+DO_SET_MODE 1 1 to=autopilot & wait 1 : ACCEPTED
+somebody> HOLD & wait 1 : ACCEPTED"""
+
+
+@for_each("other", WISHES.splitlines())
 def test_another_wish_removes_the_mark(world: World, other: str) -> None:
-    ask_mode(world.client, MISSION)
-    world.run(0.5)
-    if other == "STOP":
-        world.client.stop()
-        world.run(1)
-        world.client.proceed()
-    elif other == "pause":
-        world.client.pause()
-        world.run(0.2)
-        world.client.proceed()
-    elif other == "hold of another":
-        somebody = world.add_client("somebody")
-        world.run(1)
-        ask_mode(somebody, HOLD)
-    else:
-        ask_mode(world.client, HOLD if other == "HOLD" else MANUAL)
-    world.run(1)
+    somebody = world.add_client("somebody")
+    mark = "DO_SET_MODE 1 4 4 to=autopilot & wait 1 : ACCEPTED"
+    check(world, f"{mark}\n{other}", somebody=somebody)
     assert shown(world) != MISSION
-    world.client.arm()
-    world.run(1.5)
-    assert waits_for_start(world)
+    check(
+        world,
+        """
+ARM 1 & wait 1.5 : ACCEPTED
+SHOW 1 : ACCEPTED status 1: BLOCKED WAITING_FOR_START
+""",
+    )
 
 
 @for_each("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])

@@ -7,7 +7,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED
+from tests.kit.rows import check
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
@@ -74,13 +74,9 @@ def test_the_task_goes_on_when_the_stick_is_centred_and_somebody_says_continue(
     make_world: MakeWorld,
 ) -> None:
     world = with_transmitter(make_world, Frame.SKID)
-    world.client.move(4.0)
-    world.run(4.0)
-    world.rover.autopilot.operator_pulses(FORWARD, CENTRE)
-    world.run(4.0)
-    world.rover.autopilot.operator_pulses(CENTRE, CENTRE)
-    world.run(3.0)
-    sent = world.client.proceed()
-    world.until_state(1, S.COMPLETED, within=40)
-    assert sent.result == ACCEPTED
+    check(world, "TASK_MOVE 4 & wait 4 : ACCEPTED")
+    for throttle, seconds in ((FORWARD, 4.0), (CENTRE, 3.0)):
+        world.rover.autopilot.operator_pulses(throttle, CENTRE)
+        world.run(seconds)
+    check(world, "CONTINUE & until 1 COMPLETED within=40 : ACCEPTED")
     assert abs(world.truth.north - 4.0) < 0.1

@@ -72,34 +72,30 @@ def test_a_driving_rover_is_stopped_and_its_task_killed(world: World, component:
 @for_each("mode", [Mode.AUTO, Mode.RTL])
 def test_a_rover_that_drives_by_itself_is_stopped(world: World, mode: Mode) -> None:
     drive_by_itself(world, mode)
-    stop = world.client.stop()
-    world.until(lambda: stands_in_hold(world), within=BRAKING)
-    assert stop.answer == (ACCEPTED, 0)
-    assert world.state(1) == (S.QUEUED, R.NONE)
+    check(
+        world,
+        "TASK_STOP : ACCEPTED #0\nwait 2.7 : - it STANDS / mode hold / it is IDLE / task 1: QUEUED",
+    )
 
 
 def test_with_param1_the_queue_is_cleared(world: World) -> None:
     drive(world)
-    world.client.stop(clear=True)
-    world.until(lambda: stands_in_hold(world), within=BRAKING)
-    assert world.state(2) == (S.CANCELLED, R.CLEARED)
-    world.client.proceed()
-    world.run(2)
-    assert world.is_idle(tasks=2)
+    check(
+        world, "TASK_STOP 1 & wait 3.1 : ACCEPTED task 2: CANCELLED CLEARED / it STANDS / mode hold"
+    )
+    check(world, "CONTINUE & wait 1.6 : ACCEPTED queue NONE / it is IDLE")
 
 
 def test_stop_with_an_empty_queue_and_twice(world: World) -> None:
-    first, second = world.client.stop(), world.client.stop()
-    world.until(lambda: stands_in_hold(world), within=2)
-    assert (first.answer, second.answer) == ((ACCEPTED, 0), (ACCEPTED, 0))
-    submitted = world.client.move(1)
-    world.run(3)
-    assert world.state(submitted.task_id) == (S.QUEUED, R.NONE)
-    third = world.client.stop()
-    world.run(3)
-    assert third.answer == (ACCEPTED, 0)
-    world.client.proceed()
-    world.until_state(1, S.COMPLETED)
+    check(
+        world,
+        """
+TASK_STOP & TASK_STOP : ACCEPTED+ACCEPTED #0 / it STANDS / mode hold / it is IDLE
+TASK_MOVE 1 & wait 2.6 : ACCEPTED #1 / task 1: QUEUED NONE
+TASK_STOP & wait 2.6 : ACCEPTED #0
+CONTINUE & until 1 COMPLETED : ACCEPTED
+""",
+    )
 
 
 @for_each("delay", [k * 0.002 for k in range(0, 12, 3)])
@@ -173,14 +169,14 @@ DO_MOTOR_TEST 1 0 50 10 to=autopilot : BUSY
 
 def test_hold_by_a_client_does_not_end_a_stop_that_is_under_way(world: World) -> None:
     drive(world)
-    world.fault(Faults(refuse_mode=True))
-    world.client.stop()
-    world.run(0.5)
-    world.client.mode(4)
-    world.run(0.5)
-    world.fault(Faults())
-    world.until(lambda: stands_in_hold(world), within=BRAKING)
-    assert world.paused() is R.STOPPED
+    check(
+        world,
+        """
+fault refuse_mode=1 & TASK_STOP : ACCEPTED
+DO_SET_MODE 1 4 to=autopilot : ACCEPTED it MOVES
+fault & wait 3.1 : - it STANDS / mode hold / it is IDLE / queue STOPPED
+""",
+    )
 
 
 @for_each("silence", [4.0, 4.1, 4.2])  # HOLD is sent every 0.25 s

@@ -8,19 +8,17 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode, Persona
+from rover_sim.personas import Persona
 from tests.kit.cases import for_each
 from tests.kit.client import (
-    ACCEPTED,
-    TEMPORARILY_REJECTED,
     packed,
     rc_override,
     setpoint,
     sticks,
 )
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.rows import ask
-from tests.kit.world import PROMPT, World, near_pose
+from tests.kit.rows import ask, check
+from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
 ROWS = """operator hold
@@ -66,34 +64,27 @@ def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) ->
 
 @for_each("way", list(WAYS)[::3])
 def test_continue_resumes_to_the_exact_end_on_the_original_line(driving: World, way: str) -> None:
-    world = driving
-    WAYS[way](world)
-    world.run(0.3)
-    world.operator_mode(Mode.HOLD)
-    world.run(4)
-    proceed = world.client.proceed()
-    world.until_idle(tasks=2)
-    assert proceed.answer == (ACCEPTED, 1)
-    assert world.states() == [S.COMPLETED, S.COMPLETED]
-    assert near_pose(world.pose(), (4.0, 0.0, 90.0))
+    WAYS[way](driving)
+    check(
+        driving,
+        """
+wait 0.3 & operator hold & wait 4 & CONTINUE & idle 2 : ACCEPTED #1 / task 1: COMPLETED / \
+task 2: COMPLETED / at=4,0,90
+""",
+    )
 
 
-@for_each("mode", [Mode.MANUAL, Mode.AUTO, Mode.RTL])
-def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, mode: Mode) -> None:
-    world = driving
-    world.operator_mode(mode)
-    world.run(1)
-    at = world.now
-    refused = world.client.proceed()
-    world.run(2)
-    assert refused.answer == (TEMPORARILY_REJECTED, R.WRONG_MODE)
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-    assert world.observer.sent_since(at) == []
-    assert world.mode() is mode
-    world.operator_mode(Mode.HOLD)
-    world.run(3)
-    assert world.client.proceed()
-    world.until_idle(tasks=2)
+@for_each("mode", ["manual", "auto", "rtl"])
+def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, mode: str) -> None:
+    check(
+        driving,
+        f"""
+operator {mode} & wait 1 : -
+CONTINUE & wait 2 : BUSY #{R.WRONG_MODE} / task 1: PAUSED TAKEOVER / it gets nothing / mode {mode}
+operator hold & wait 3 : -
+CONTINUE & idle 2 : ACCEPTED
+""",
+    )
 
 
 @for_each("persona, throttle", [(PROMPT, 0), (PROMPT_PX4, 0), (PROMPT_PX4, 500)])
@@ -102,30 +93,25 @@ def test_sticks_at_rest_are_no_takeover(
 ) -> None:
     """A PX4 takes 500 for no throttle: QGroundControl's, unless its stick is zero at the centre."""
     world = make_world(persona=persona)
-    world.client.move(2)
     world.client.stream(sticks(z=throttle), rate=10)
     world.client.stream(rc_override(1500, 1500, 1510, 0), rate=10)
-    world.run(3)
-    assert world.state(1)[0] is S.EXECUTING
-    if throttle:
-        world.client.send(sticks(z=0))
-        world.run(0.1)
-        assert world.state(1) == (S.PAUSED, R.TAKEOVER), "full reverse"
-    else:
-        world.until_state(1, S.COMPLETED)
+    check(world, "TASK_MOVE 2 & wait 3 : ACCEPTED task 1: EXECUTING")
+    full_reverse = "client:manual_control 1 0 0 0 0 0 & wait 0.1 : - task 1: PAUSED TAKEOVER"
+    check(world, full_reverse if throttle else "until 1 COMPLETED : -")
 
 
 @for_each("arming", ["server", "operator"])
 def test_other_setpoints_make_waiting_tasks_wait(make_world: MakeWorld, arming: str) -> None:
     world = make_world(settings=Settings(arming=arming))
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(0.5)
+    check(world, "operator hold & operator arms & wait 0.5 : -")
     for _ in range(20):
         world.from_vehicle_side(packed(setpoint(0.3), 9, 9))
         world.run(0.05)
-    world.client.move(1)
-    world.run(0.5)
-    assert world.shown(1).why == (S.QUEUED, R.OTHER_CONTROLLER)
-    world.run(3)
-    assert world.state(1)[0] is S.EXECUTING
+    check(
+        world,
+        """
+TASK_MOVE 1 : ACCEPTED
+SHOW 1 : ACCEPTED status 1: QUEUED OTHER_CONTROLLER
+wait 3 : - task 1: EXECUTING
+""",
+    )

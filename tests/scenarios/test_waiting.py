@@ -97,13 +97,18 @@ def test_a_step_of_the_clock_changes_no_motion_no_delay_and_no_deadline(
 
 
 def test_a_deadline_ends_what_has_not_begun(world: World) -> None:
-    submit(world, 3)
-    task, *dependents = submit(world), submit(world, after=2), submit(world, after=3)
-    world.client.command(MODIFY, task, DEADLINE, 2)
-    world.run(2.2)
-    assert world.state(task) == (S.EXPIRED, R.DEADLINE)
-    assert [world.state(each) for each in dependents] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 2
-    assert world.paused() is R.NONE
+    failed = "FAILED DEPENDENCY_FAILED"
+    check(
+        world,
+        f"""
+TASK_MOVE 3 : ACCEPTED #1
+TASK_MOVE 0.2 : ACCEPTED #2
+TASK_MOVE 0.2 0 0 0 2 : ACCEPTED #3
+TASK_MOVE 0.2 0 0 0 3 : ACCEPTED #4
+TASK_MODIFY 2 3 2 & wait 2.2 : ACCEPTED #2 / task 2: EXPIRED DEADLINE / task 3: {failed}
+wait 0 : - task 4: {failed} / queue NONE
+""",
+    )
 
 
 def test_tasks_run_after_each_other_across_rovers(make_world: MakeWorld) -> None:

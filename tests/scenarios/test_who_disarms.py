@@ -4,36 +4,31 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Persona
 from tests.kit.cases import for_each
 from tests.kit.client import (
-    ACCEPTED,
     GUIDED,
     HOLD,
-    RTL,
-    Sent,
     setpoint,
 )
-from tests.kit.px4 import OFFBOARD, PROMPT_PX4, RETURN, ask_mode
+from tests.kit.px4 import OFFBOARD, PROMPT_PX4, ask_mode
+from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 BOTH = for_each("persona", [ARDUPILOT, PROMPT_PX4])
-LAND, TAKEOFF = 21, 22
 HANDED_BACK = 6.0  # s after a task, in which the server has HOLD shown and disarms
 
 
 @BOTH
-@for_each("at", [S.STARTING, S.EXECUTING])
+@for_each("at", ["STARTING", "EXECUTING"])
 def test_a_rover_that_a_client_arms_while_a_task_drives_stays_armed(
-    make_world: MakeWorld, persona: Persona, at: S
+    make_world: MakeWorld, persona: Persona, at: str
 ) -> None:
-    world = make_world(persona=persona)
-    world.client.move(1.0)
-    world.until_state(1, at)
-    sent = world.client.arm(True)
-    world.run(0.3)
-    assert sent.result == ACCEPTED
-    world.until_state(1, S.COMPLETED, within=20)
-    world.run(HANDED_BACK)
-    assert world.is_armed
+    check(
+        make_world(persona=persona),
+        f"""
+TASK_MOVE 1 & until 1 {at} & ARM 1 & until 1 COMPLETED : ACCEPTED+ACCEPTED
+wait 6 : - it is ARMED
+""",
+    )
 
 
 @BOTH
@@ -43,9 +38,7 @@ def test_a_client_that_arms_while_the_server_disarms_has_the_last_word(
     world = make_world(persona=persona)
     world.client.move(0.5)
     world.until(lambda: world.control() == "DISARMING", within=20)
-    world.client.arm(True)
-    world.run(HANDED_BACK)
-    assert world.is_armed
+    check(world, "ARM 1 & wait 6 : ACCEPTED it is ARMED")
 
 
 @BOTH
@@ -64,16 +57,16 @@ def test_a_person_who_arms_while_the_server_disarms_has_the_last_word(
 
 
 def test_what_a_client_disarms_and_a_person_arms_again_stays_armed(world: World) -> None:
-    world.client.move(0.5)
-    world.until_state(1, S.EXECUTING)
-    world.client.arm(False)
-    world.run(6)
-    world.operator_arm(True)
-    world.run(2)
-    world.client.proceed()
-    world.until_state(1, S.COMPLETED)
-    world.run(HANDED_BACK)
-    assert world.is_armed
+    check(
+        world,
+        """
+TASK_MOVE 0.5 & until 1 EXECUTING : ACCEPTED
+ARM 0 & wait 6 : ACCEPTED it is DISARMED
+operator arms & wait 2 : -
+CONTINUE & until 1 COMPLETED : ACCEPTED
+wait 6 : - it is ARMED
+""",
+    )
 
 
 def armed_by_client(make_world: MakeWorld, persona: Persona) -> World:
@@ -86,34 +79,22 @@ def armed_by_client(make_world: MakeWorld, persona: Persona) -> World:
     return world
 
 
-def returns(world: World, persona: Persona) -> None:
-    """Ask for the mode RTL, and wait until the rover is at home."""
-    count = len(world.tasks())
-    sent = world.client.mode(RTL) if persona is ARDUPILOT else ask_mode(world.client, RETURN)
-    world.run(0.3)
-    assert sent.task_id == count + 1
-    world.until_state(sent.task_id, S.COMPLETED, within=30)
-
-
 @BOTH
 def test_a_return_ends_disarmed_whoever_armed_the_rover(
     make_world: MakeWorld, persona: Persona
 ) -> None:
     """MAVSDK's fly_mission waits for that after return_to_launch."""
     world = armed_by_client(make_world, persona)
-    world.client.move(1.0)
-    world.until_state(1, S.COMPLETED, within=20)
-    world.run(HANDED_BACK)
-    assert world.is_armed
-    returns(world, persona)
-    world.run(HANDED_BACK)
-    assert not world.is_armed
-
-
-def land(world: World) -> Sent:
-    sent = world.client.command(LAND, target=(1, 1))
-    world.run(0.2)
-    return sent
+    mode = "11" if persona is ARDUPILOT else "4 5"
+    check(
+        world,
+        f"""
+TASK_MOVE 1 & until 1 COMPLETED : ACCEPTED
+wait 6 : - it is ARMED
+DO_SET_MODE 1 {mode} to=autopilot & until 2 COMPLETED : ACCEPTED #2
+wait 6 : - it is DISARMED
+""",
+    )
 
 
 @BOTH
@@ -122,11 +103,13 @@ def test_takeoff_and_land_are_both_accepted_and_land_disarms(
 ) -> None:
     """The first and the last line of many a script."""
     world = armed_by_client(make_world, persona)
-    takeoff = world.client.command(TAKEOFF, target=(1, 1))
-    world.run(0.2)
-    assert (takeoff.result, land(world).result) == (ACCEPTED, ACCEPTED)
-    world.run(HANDED_BACK)
-    assert not world.is_armed
+    check(
+        world,
+        """
+NAV_TAKEOFF to=autopilot : ACCEPTED
+NAV_LAND to=autopilot & wait 6 : ACCEPTED it is DISARMED
+""",
+    )
     assert world.tasks() == ()
 
 
@@ -140,6 +123,4 @@ def test_land_ends_what_its_client_drives_by_setpoints(
     _ = world.client.mode(GUIDED) if persona is ARDUPILOT else ask_mode(world.client, OFFBOARD)
     world.run(2)
     assert world.truth.forward_speed > 0.4
-    land(world)
-    world.run(HANDED_BACK)
-    assert (world.stands(), world.is_armed) == (True, False)
+    check(world, "NAV_LAND to=autopilot & wait 6 : ACCEPTED it STANDS / it is DISARMED")

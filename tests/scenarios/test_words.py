@@ -5,9 +5,10 @@ from math import nan
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import AUTO, RTL, FakeClient
+from tests.kit.rows import check
 from tests.kit.world import World, at
 
-REPOSITION, CANCEL = 192, 54010
+REPOSITION = 192
 CANCELLED, TEMPORARILY_REJECTED = 6, 1  # MAV_RESULT
 WARNING = 4  # MAV_SEVERITY
 FIRST_PIECE = 50  # characters that a client shows that does not join pieces
@@ -47,14 +48,15 @@ def test_a_go_to_that_waits_for_a_button_is_a_warning_that_names_it(
 
 
 def test_who_called_a_task_off_is_said(world: World) -> None:
-    world.client.move(5)
-    world.client.move(4, nonce=2)
-    world.until_state(1, S.EXECUTING)
-    world.client.command(CANCEL, 2)
-    world.run(0.2)
-    world.client.command(CANCEL, 1)
-    world.run(4)
-    assert {"Task 2 cancelled by a ground station", "Task 1 cancelled"} <= set(world.client.texts())
+    check(
+        world,
+        """
+TASK_MOVE 5 & until 1 EXECUTING : ACCEPTED
+TASK_MOVE 4 0 0 2 : ACCEPTED
+TASK_CANCEL 2 : ACCEPTED Task 2 cancelled by a ground station
+TASK_CANCEL 1 & wait 4 : ACCEPTED Task 1 cancelled
+""",
+    )
 
 
 @for_each("mode", [RTL, AUTO])
@@ -85,19 +87,14 @@ class TestSummary:
     """A station that is new, or back, is told why nothing moves, once it knows the rover."""
 
     def test_of_a_pause(self, world: World) -> None:
-        world.client.move(5)
-        world.client.move(2, nonce=2)
-        world.until_state(1, S.EXECUTING)
-        world.client.pause()
-        world.run(3)
+        check(world, "TASK_MOVE 5 & until 1 EXECUTING : ACCEPTED\nTASK_MOVE 2 0 0 2 : ACCEPTED")
+        check(world, "PAUSE & wait 3 : ACCEPTED")
         assert said(station(world)) == {
             "Task 1 paused, press Continue (queue paused); 1 ta": WARNING
         }
 
     def test_of_a_stop(self, world: World) -> None:
-        world.client.move(5)
-        world.client.stop()
-        world.run(2)
+        check(world, "TASK_MOVE 5 & TASK_STOP & wait 2 : ACCEPTED+ACCEPTED")
         screen = station(world)
         assert said(screen) == {"STOP in force, press Continue; 1 task waits": WARNING}
         screen.received.clear()

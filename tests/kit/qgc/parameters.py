@@ -14,7 +14,6 @@ LIST_EACH, LIST_TRIES = 5.0, 5  # s [1.4], [11.1]
 HASH_WAIT = 1.0  # s [1.4]
 FTP_WAIT, FTP_TRIES = 1.0, 3  # s; assumed: "silence costs FTP retries"
 MISSING_WAIT = 3.0  # s without a value; assumed
-BATCH, READ_TRIES = 10, 5  # [1.4]
 UNNUMBERED = 65535
 HASH = "_HASH_CHECK"
 PACKED_FILE = b"@PARAM/param.pck?withdefaults=1"
@@ -34,7 +33,6 @@ class Component:
     count: int
     names: set[str] = field(default_factory=set)
     missing: set[int] = field(default_factory=set)
-    tries: int = 0
 
     def __post_init__(self) -> None:
         self.missing = set(range(self.count))
@@ -94,7 +92,7 @@ class Parameters:
             ):
                 self._end()
             else:
-                self._wait(MISSING_WAIT, self._ask_missing)
+                self._wait(MISSING_WAIT, self._not_all)
 
     def receive_file(self, message: Message) -> None:
         """Take an answer about the packed file; after a NAK, request the list [11.3]."""
@@ -129,27 +127,9 @@ class Parameters:
         self._core.send(mavlink.MAVLink_param_request_list_message(self._core.system, 0))
         self._wait(LIST_EACH, self._ask_list)
 
-    def _ask_missing(self) -> None:
-        wanted = [
-            (component, index)
-            for component, known in self.components.items()
-            for index in sorted(known.missing)
-        ]
-        if AUTOPILOT not in self.components:
-            self._ask_list()
-            return
-        batch = wanted[:BATCH]
-        for component in {component for component, _ in batch}:
-            known = self.components[component]
-            known.tries += 1
-            if known.tries > READ_TRIES * (1 + known.count // BATCH):
-                self._core.popup(NOT_ALL.format(self._core.system))
-                return
-        for component, index in batch:
-            self._core.send(
-                mavlink.MAVLink_param_request_read_message(self._core.system, component, b"", index)
-            )
-        self._wait(MISSING_WAIT, self._ask_missing)
+    def _not_all(self) -> None:
+        """Complain at once: it would ask for them again, but here none is lost [1.4]."""
+        self._core.popup(NOT_ALL.format(self._core.system))
 
     def _end(self) -> None:
         self.is_ready = True

@@ -11,11 +11,9 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import MAX_TASK_ID
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, MOVE, REQUEST, TASK_STATUS
+from tests.kit.rows import check
 from tests.kit.world import World
 
-CANCEL, MODIFY = 54010, 54012
-PRIORITY = 1  # TASK_PROPERTY
 LAST_EXACT = 2**24 - 1
 A_DAY = 86_400
 TEN_YEARS = 3652 * A_DAY  # of a task a second
@@ -60,34 +58,29 @@ def test_an_id_that_a_task_still_has_is_left_out(world: World) -> None:
 
 def test_an_id_above_what_a_float32_counts_is_named_by_its_bits(world: World) -> None:
     after_so_many(world, LAST_EXACT + 1)
-    world.client.pause()
-    world.run(0.2)
-    first = world.client.move(1.0, nonce=1)
-    world.run(0.2)
-    number = first.task_id
-    assert number == LAST_EXACT + 2, "odd, so that no float32 is it"
-    after = world.client.command(MOVE, 1.0, 0, 0, 2, param(number))
-    world.run(0.2)
-    assert world.task(after.task_id).terms.after == number
-    asked = world.client.command(REQUEST, TASK_STATUS, param(number))
-    modified = world.client.command(MODIFY, param(number), PRIORITY, 7)
-    world.run(0.2)
-    assert (asked.result, modified.answer) == (ACCEPTED, (ACCEPTED, number))
-    assert world.client.statuses(number)[-1].priority == 7
-    cancelled = world.client.command(CANCEL, param(number))
-    world.run(0.2)
-    assert cancelled.answer == (ACCEPTED, number)
-    assert world.state(number)[0] is S.CANCELLED
+    number = LAST_EXACT + 2  # odd, so that no float32 is it
+    check(
+        world,
+        f"""
+PAUSE : ACCEPTED
+TASK_MOVE 1 0 0 1 : ACCEPTED #{number}
+TASK_MOVE 1 0 0 2 {param(number)} : ACCEPTED #{number + 1}
+SHOW {param(number)} : ACCEPTED status {number}: QUEUED
+TASK_MODIFY {param(number)} 1 7 : ACCEPTED #{number}
+""",
+    )
+    assert world.task(number + 1).terms.after == number
+    assert world.task(number).priority == 7
+    check(world, f"TASK_CANCEL {param(number)} : ACCEPTED #{number} / task {number}: CANCELLED")
 
 
 def test_a_float32_that_was_rounded_names_no_task(world: World) -> None:
     after_so_many(world, LAST_EXACT)
-    world.client.pause()
-    world.run(0.2)
-    task = world.client.move(1.0)
-    world.run(0.2)
-    assert task.task_id == 2**24
-    cancelled = world.client.command(CANCEL, 2.0**24)
-    world.run(0.2)
-    assert cancelled.answer == (DENIED, R.BAD_PARAMETER)
-    assert world.state(task.task_id)[0] is S.QUEUED
+    check(
+        world,
+        f"""
+PAUSE : ACCEPTED
+TASK_MOVE 1 : ACCEPTED #{2**24}
+TASK_CANCEL {2**24} : DENIED #{R.BAD_PARAMETER} / task {2**24}: QUEUED
+""",
+    )

@@ -28,6 +28,7 @@ from tests.kit.client import (
 from tests.kit.mission import Item
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
+from tests.kit.rows import check
 from tests.kit.world import World, at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
 
@@ -214,9 +215,6 @@ def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
 # a release under a pause
 
 
-RELEASE, AGAIN = 54013, 0
-
-
 PAUSES = ("pause", "HOLD", "takeover")
 
 
@@ -242,25 +240,23 @@ def held_and_paused(world: World, how: str) -> None:
 def test_it_waits_for_the_continue_and_then_goes_on(world: World, how: str) -> None:
     held_and_paused(world, how)
     before = world.pose()
-    released = world.client.command(RELEASE, 1, AGAIN)
-    world.run(5)
-    assert released.answer == (ACCEPTED, 1)
+    words = "Task 1 waits: released; press Continue to start it"
+    check(world, f"TASK_RELEASE 1 0 & wait 5 : ACCEPTED #1 / task 1: HELD / {words}")
     assert world.pose() == pytest.approx(before, abs=0.001)
-    assert world.state(1)[0] is S.HELD
-    assert "Task 1 waits: released; press Continue to start it" in world.client.texts()
-    world.client.proceed()
-    world.until_state(1, S.EXECUTING, within=5)
+    check(world, "CONTINUE & until 1 EXECUTING within=5 : ACCEPTED")
 
 
 @for_each("how", PAUSES)
 def test_the_next_halt_takes_it_back(world: World, how: str) -> None:
     held_and_paused(world, how)
-    world.client.command(RELEASE, 1, AGAIN)
-    world.run(1)
-    world.add_client("another").pause()
-    world.run(5)
+    check(
+        world,
+        """
+TASK_RELEASE 1 0 & wait 1 : ACCEPTED
+another> PAUSE & wait 5 : ACCEPTED
+""",
+        another=world.add_client("another"),
+    )
     before = world.pose()
-    world.client.proceed()
-    world.run(4)
+    check(world, "CONTINUE & wait 4 : ACCEPTED task 1: HELD")
     assert world.pose() == pytest.approx(before, abs=0.001)
-    assert world.state(1)[0] is S.HELD

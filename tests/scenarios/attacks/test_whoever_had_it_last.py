@@ -14,8 +14,8 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED
 from tests.kit.px4 import HOLD, PROMPT_PX4, REPOSITION, ask_mode
+from tests.kit.rows import check
 from tests.kit.world import World, at
 from tests.scenarios.attacks.test_left_waiting import stays, unheard
 from tests.scenarios.conftest import MakeWorld
@@ -34,21 +34,16 @@ def drive_by_hand(world: World) -> None:
 def test_a_rover_that_a_person_parks_does_not_drive_off_with_what_waits(
     world: World, when: str
 ) -> None:
-    if when == "before":
-        world.client.command(54000, 3, 0, 0, 0, 0, 15, 5)  # begins in 15 s
+    if when == "before":  # begins in 15 s
+        check(world, "TASK_MOVE 3 0 0 0 0 15 5 : ACCEPTED")
     drive_by_hand(world)
     if when == "meanwhile":
-        world.client.move(3)
-    world.run(2)
-    world.operator_mode(Mode.HOLD)
+        check(world, "TASK_MOVE 3 : ACCEPTED")
+    check(world, "wait 2 & operator hold & wait 0 : -")
     before = world.pose()
-    world.run(20)
+    check(world, "wait 20 : - queue TAKEOVER / task 1: QUEUED")
     assert world.pose() == pytest.approx(before, abs=0.001)
-    assert world.paused() is R.TAKEOVER
-    assert world.state(1)[0] is S.QUEUED
-    going = world.client.proceed()
-    world.until_state(1, S.COMPLETED)
-    assert going.result == ACCEPTED
+    check(world, "CONTINUE & until 1 COMPLETED : ACCEPTED")
 
 
 def test_a_go_to_of_another_behind_the_same_router_does_not_undo_a_hold(

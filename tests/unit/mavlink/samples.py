@@ -35,10 +35,18 @@ def stock_message(random: Random, *, v1: bool = False) -> Any:
 
 
 def stock_packet(
-    message: Any, *, seq: int, source: tuple[int, int] = (1, 1), v1: bool = False
+    message: Any,
+    *,
+    seq: int,
+    source: tuple[int, int] = (1, 1),
+    v1: bool = False,
+    signature: tuple[bytes, int, int] | None = None,
 ) -> bytes:
-    """The packet that stock pymavlink makes of a message."""
+    """The packet that stock pymavlink makes of a message; a signature is key, link and time."""
     mav = common.MAVLink(None, srcSystem=source[0], srcComponent=source[1])
     mav.seq = seq
+    if signature:
+        mav.signing.sign_outgoing = True
+        mav.signing.secret_key, mav.signing.link_id, mav.signing.timestamp = signature
     packed: bytes = message.pack(mav, force_mavlink1=v1)
     return packed

@@ -4,12 +4,14 @@ from collections.abc import Iterator
 from random import Random
 from typing import Any
 
+from pymavlink.dialects.v20 import common
+
 from mav_tasks.mavlink import _dialect
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Encoder, Packer, target_of
 from mav_tasks.mavlink.packet import Packet, split_datagram
-from tests.unit.mavlink.samples import message_of, raw_packet
+from tests.unit.mavlink.samples import message_of, raw_packet, stock_packet
 
 SOURCE = Address(12, 34)
 
@@ -56,6 +58,20 @@ def test_packets_of_all_kinds_are_decoded_as_pymavlink_decodes_them() -> None:
         for raw in packets_of(kind):
             theirs = _dialect.MAVLink(None).decode(bytearray(raw))
             assert fields(Decoder().decode(only(raw))) == fields(theirs), raw.hex()
+
+
+def test_the_stock_dialect_s_packets_of_either_version_are_understood_and_made() -> None:
+    """It has some of the messages without their newest extensions."""
+    for number in m.ALL.keys() & common.mavlink_map.keys():
+        theirs = message_of(common.mavlink_map[number], Random(number))
+        for v1 in (False, True)[: 1 + (number < 256)]:
+            raw = stock_packet(theirs, seq=5, source=SOURCE, v1=v1)
+            theirs = common.MAVLink(None).decode(bytearray(raw))
+            ours = Decoder().decode(only(raw))
+            assert ours is not None
+            for name in theirs.fieldnames:
+                assert repr(getattr(ours, name)) == repr(getattr(theirs, name)), (theirs, name)
+            assert v1 or Packer().pack(ours, SOURCE, seq=5) == raw, theirs
 
 
 def test_an_encoder_numbers_its_packets_and_wraps() -> None:

@@ -1,7 +1,6 @@
 """Signatures as pymavlink makes them, and when one is news."""
 
-import json
-from typing import Any
+from random import Random
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,11 +23,9 @@ from mav_tasks.mavlink.signing import (
     timestamp_at,
     timestamp_of,
 )
-from tests.vectors.make_vectors import GOLDEN, LINK_IDS, SECRET, TIMESTAMPS
+from tests.unit.mavlink.samples import stock_message, stock_packet
 
-VECTORS: list[dict[str, Any]] = [
-    vector for vector in json.loads(GOLDEN.read_text(encoding="utf-8")) if "signed" in vector
-]
+SECRET = bytes(range(7, 39))
 WINDOW = 60 * 100_000
 ONE = Stream(1, Address(255, 190))
 KEY = Key("anna", SECRET, "operator")
@@ -41,18 +38,18 @@ def only(raw: bytes) -> Packet:
 
 def test_pymavlinks_signature_is_read_and_ours_is_the_same_bit_for_bit() -> None:
     """The packet is as long as it was and 13 bytes, so the CRC, which covers the flag, is new."""
-    for number, vector in enumerate(VECTORS):
-        link, timestamp = LINK_IDS[number % 3], TIMESTAMPS[number % 4]
-        packet = only(bytes.fromhex(vector["signed"]))
+    for number, timestamp in enumerate((1, 37_000_000_000_000, (1 << 48) - 2, 0xFF00)):
+        message, link = stock_message(Random(number), v1=True), (0, 1, 255, 7)[number]
+        signature = SECRET, link, timestamp
+        theirs = stock_packet(message, seq=9, source=ONE.source, signature=signature)
+        packet = only(theirs)
         assert packet.is_signed
         assert is_signed_with(packet, SECRET)
         assert not is_signed_with(packet, bytes(32))
-        assert stream_of(packet) == Stream(link, Address(1 + number, 191))
-        assert timestamp_of(packet) == timestamp
-        raw = bytes.fromhex(vector["packet"])
-        made = signed(raw, SECRET, link_id=link, timestamp=timestamp)
-        assert made.hex() == vector["signed"]
-        v1 = bytes.fromhex(vector["v1"])  # has no signature
+        assert (stream_of(packet), timestamp_of(packet)) == (Stream(link, ONE.source), timestamp)
+        raw = stock_packet(message, seq=9, source=ONE.source)
+        assert signed(raw, SECRET, link_id=link, timestamp=timestamp) == theirs
+        v1 = stock_packet(message, seq=9, source=ONE.source, v1=True)  # has no signature
         assert signed(v1, SECRET, link_id=0, timestamp=1) == v1
         assert Signer(KEY, link_id=0).sign(v1, clock=1) == v1
         assert not only(v1).is_signed
@@ -60,7 +57,7 @@ def test_pymavlinks_signature_is_read_and_ours_is_the_same_bit_for_bit() -> None
 
 @given(place=st.integers(0), bit=st.integers(0, 7))
 def test_any_bit_that_is_changed_makes_it_nobodys(place: int, bit: int) -> None:
-    raw = bytearray.fromhex(VECTORS[0]["signed"])
+    raw = bytearray(stock_packet(stock_message(Random(0)), seq=9, signature=(SECRET, 1, 2)))
     raw[place % len(raw)] ^= 1 << bit
     for packet in split_datagram(bytes(raw)):
         assert not (packet.is_signed and is_signed_with(packet, SECRET))
@@ -136,7 +133,7 @@ def times_of(packets: list[bytes]) -> list[int]:
 
 
 def test_each_of_our_signatures_is_later_than_the_one_before() -> None:
-    raw = bytes.fromhex(VECTORS[0]["packet"])
+    raw = stock_packet(stock_message(Random(0)), seq=9)
     signer = Signer(KEY, link_id=3)
     clocks = (1000, 1000, 500, 1001, 5000)
     assert times_of([signer.sign(raw, clock=clock) for clock in clocks]) == [
@@ -149,7 +146,7 @@ def test_each_of_our_signatures_is_later_than_the_one_before() -> None:
 
 def test_a_time_that_cannot_be_later_is_the_latest() -> None:
     """Who holds a key must not be able to end a server by it."""
-    raw = bytes.fromhex(VECTORS[0]["packet"])
+    raw = stock_packet(stock_message(Random(0)), seq=9)
     signer = Signer(KEY, link_id=3)
     signer.heard(HIGHEST_TIMESTAMP)
     assert times_of([signer.sign(raw, clock=1) for _ in range(2)]) == [HIGHEST_TIMESTAMP] * 2
