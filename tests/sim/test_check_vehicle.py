@@ -29,8 +29,8 @@ def test_a_rover_is_checked_over_udp(tmp_path: Path) -> None:
         done = check(f"udpout:127.0.0.1:{found[1]}", "--only", "answers")
     assert done.returncode == 0, done.stdout + done.stderr
     *lines, summary = done.stdout.splitlines()
-    assert "ok: answers: a command for another system: no answer within 1 s" in lines
-    assert summary == f"{len(lines)} ok, 0 failed, 0 skipped"
+    assert "ok: answers: a command for another system: no answer within 1 s (no answer .*)" in lines
+    assert summary == "0 failed"
 
 
 def test_bad_usage_is_refused_by_name() -> None:

@@ -1,34 +1,43 @@
-"""What is measured in a trace: figures by group and name, of which real.csv says unit and limit."""
+"""What is measured in a drive: the figures of real rovers beside those of the simulated ones.
 
-import math
+real.csv has the figures of the real ones, recorded in November 2026, in real time, in the same
+manoeuvres: ArduPilot Rover 4.6.3 SITL, true pose from SIM_STATE; PX4 1.17.0 SITL, a kinematic
+differential rover in lock-step and the Ackermann rover of its SIH. All settings at their defaults
+(the differential rover: RO_SPEED_LIM 1.8, RO_MAX_THR_SPEED 2, RO_ACCEL_LIM 4, RO_DECEL_LIM 6,
+RO_JERK_LIM 10, RO_YAW_RATE_LIM 250, RO_YAW_P 5), no radio, one ground station.
+
+A dash: it did not happen or was never sent; empty: not driven; in texts # replaces a number. In
+brackets is what a simulated rover may show instead, where a difference is meant or cannot be
+helped: a range or a text, so that it hides no change, and ``why``.
+"""
+
+import csv
 import re
-import statistics
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pymavlink.dialects.v20 import development as mav
 
-from rover_sim.check_vehicle.manoeuvres import ARMED, ASKED, READYING, Span, Trace
-from rover_sim.observing.driver import ARMED as ARMED_FLAG
-from rover_sim.observing.track import Place, way
+from rover_sim.check_vehicle.manoeuvres import ASK_PLACES, ASKED, Moment
+from rover_sim.observing.driver import ARMED
 
 Value = float | str | None  # None: it did not happen, or was never sent
-Named = Iterator[tuple[str, Value]]
 
+FACTOR = 1.5  # either way, between a figure and the real one
+NOTHING = "–"
 STANDS = 0.03  # m/s, true speed
-STANDS_FOR = 0.4  # s of standing, or up to the end of the poses
+STANDS_FOR = 0.4  # s of standing, or up to the end of the places
 STEADY_FROM = 0.6  # of a step's time: the overshoot is over
 RISEN = 0.63  # of the speed that was asked
-LOOKED_AT = 20.0  # s, the last part of standing
-EVERY = 3  # of the reported samples, which come faster than anything changes
-ARMS_WITHIN = 2.4  # s, the duration of arming and taking control
 HOME_MOVED = 2.7e-6  # deg, 0.3 m; less is the estimate's noise
-HEARTBEAT_PERIOD = 1.0  # s: the last HEARTBEAT before the start has the first mode
+MODE_BEFORE = 1.5  # s: the last HEARTBEAT before the start has the first mode
+HOME_BEFORE = ASK_PLACES + 0.1  # s, the same for home
 PREARM = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
 REASONS = ("Arm:", "PreArm", "Arming denied", "Preflight Fail")
-RESULTS = ("accepted", "temporarily rejected", "denied", "unsupported", "failed", "in progress")
-NUMBERS = re.compile(r"\d+")
 MODES = {
     0: "MANUAL",
     4: "HOLD",
@@ -42,179 +51,182 @@ MODES = {
 GUIDED = 15
 
 
-def figures_of(trace: Trace) -> dict[tuple[str, str], Value]:
-    """Return every figure by group and name: of the manoeuvres by their marks."""
-    groups: dict[str, Named] = {
-        "Start": _start(trace),
-        "Standing disarmed": _standing(trace, "standing disarmed"),
-        "Standing armed": _standing(trace, "standing armed"),
-        "Origin and home": _home(trace),
-        **{mark: _motion(trace, mark) for _, mark in trace.marks[:-1]},
-    }
-    return {(group, name): value for group, named in groups.items() for name, value in named}
+def _first(name: str, it: Moment, fits: Callable[[Any], object] = lambda _: True) -> Value:
+    """Return the seconds until the first message that fits, or None."""
+    return next((row.at - it.begin for row in it.heard(name) if fits(row.message)), None)
 
 
-# helpers
+def _accepted(command: int, it: Moment, param: float) -> Value:
+    """Return the seconds until a command with this parameter was accepted, or None."""
+    found = (each for each in it.answers if (each.command, each.is_accepted) == (command, True))
+    return next((a.asked_at + a.took - it.begin for a in found if param in a.params[:2]), None)
 
 
-def quantile(values: Sequence[float], share: float) -> float | None:
-    """Return the value below which ``share`` of the values lie; None if there are none."""
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else None
+def _refusals(it: Moment) -> list[str]:
+    arming = (each for each in it.answers if each.command == mav.MAV_CMD_COMPONENT_ARM_DISARM)
+    return [str(each).partition(" after")[0] for each in arming if each.is_refused]
 
 
-def _spread(name: str, values: Sequence[float]) -> Named:
-    yield f"{name}, p50", quantile(values, 0.5)
-    yield f"{name}, p95", quantile(values, 0.95)
+def _joined(texts: list[str], by: str = "; ") -> Value:
+    """Return the different texts in their order, None if there are none."""
+    return by.join(dict.fromkeys(texts)) or None
 
 
-def _unwrapped(angles: Sequence[float]) -> list[float]:
-    out: list[float] = []
-    for angle in angles:
-        out.append(out[-1] + math.remainder(angle - out[-1], math.tau) if out else angle)
-    return out
+def _texts(it: Moment) -> list[str]:
+    return [str(row.message.text).strip() for row in it.heard("STATUSTEXT")]
 
 
-def _turned(places: Sequence[Place]) -> float:
-    """Return the degrees from the first heading to the last, through all between."""
-    smooth = _unwrapped([place.yaw for place in places])
-    return math.degrees(smooth[-1] - smooth[0])
+def _modes(it: Moment) -> list[str]:
+    beats = [row.message for row in it.heard("HEARTBEAT", MODE_BEFORE)]
+    names = [MODES.get(beat.custom_mode, f"mode {beat.custom_mode}") for beat in beats]
+    shown = zip(names, beats, strict=True)
+    return [name if beat.base_mode & ARMED else f"{name} disarmed" for name, beat in shown]
 
 
-def _first(trace: Trace, name: str, fits: Callable[[Any], object] = lambda _: True) -> Value:
-    """Return the seconds from the first of all messages to the first that fits, or None."""
-    began = min(rows[0].at for rows in trace.heard.values())
-    found = (each.at - began for each in trace.heard.get(name, ()) if fits(each.message))
-    return next(found, None)
+def _home_moves(it: Moment) -> Value:
+    places = it.fields("HOME_POSITION", "latitude", "longitude", before=HOME_BEFORE) * 1e-7
+    return "yes" if (np.abs(np.diff(places)) > HOME_MOVED).any() else "no"
 
 
-def _texts(trace: Trace, span: Span) -> list[str]:
-    return [str(each.message.text).strip() for each in trace.messages("STATUSTEXT", span)]
+def _reported(share: float, it: Moment) -> Value:
+    return float(np.quantile(np.hypot(*it.fields("LOCAL_POSITION_NED", "vx", "vy")), share))
 
 
-def _rest(poses: Sequence[Place], start: float) -> tuple[Value, Value]:
-    """Return when and after which way the rover stood for STANDS_FOR; None if it did not."""
-    since = None  # index of the first pose of the present standing
-    for i, pose in enumerate(poses):
-        if abs(pose.speed) >= STANDS:
-            since = None
-        elif since is None:
-            since = i
-        if since is not None and pose.time - poses[since].time >= STANDS_FOR:
-            break
-    if since is None:
-        return None, None
-    return poses[since].time - start, way(list(poses[: since + 1]))
+def _wandered(it: Moment) -> Value:
+    places = it.fields("LOCAL_POSITION_NED", "x", "y")
+    return float(np.quantile(np.hypot(*(places.T - places.mean(axis=1)).T), 0.95))
 
 
-# the groups
+def _landed(it: Moment) -> Value:
+    states = it.fields("EXTENDED_SYS_STATE", "landed_state")
+    return float(states[0, -1]) if states.size else None
 
 
-def _start(trace: Trace) -> Named:
-    armed_at = next(at for at, name in trace.marks if name == ARMED)
-    until_armed = Span(0.0, armed_at)
-    began = min(rows[0].at for rows in trace.heard.values())
-    yield "first LOCAL_POSITION_NED", _first(trace, "LOCAL_POSITION_NED")
-    yield "first GPS_GLOBAL_ORIGIN", _first(trace, "GPS_GLOBAL_ORIGIN")
-    yield "first HOME_POSITION", _first(trace, "HOME_POSITION")
-    healthy = _first(trace, "SYS_STATUS", lambda m: m.onboard_control_sensors_health & PREARM)
-    yield "pre-arm check healthy", healthy
-    arming = [each for each in trace.answers if each.command == mav.MAV_CMD_COMPONENT_ARM_DISARM]
-    accepted = next(each for each in arming if each.is_accepted)
-    yield "arming accepted", accepted.asked_at + accepted.took - began
-    if not trace.make.is_px4:
-        asked = [each for each in trace.answers if each.command == mav.MAV_CMD_DO_SET_MODE]
-        guided = [each for each in asked if each.params[1] == GUIDED and each.is_accepted]
-        yield "GUIDED accepted", guided[0].asked_at - began
-        within = trace.messages("HEARTBEAT", Span(began + 1.0, began + 6.0))
-        lost = any(each.message.custom_mode == 0 for each in within)
-        yield "GUIDED lost again", "yes" if lost else "no"
-    refused = [RESULTS[each.result] for each in arming[: arming.index(accepted)] if each.result]
-    yield "arming refused, times", len(refused)
-    yield "arming refused with", ", ".join(dict.fromkeys(refused)) or None
-    reasons = [text for text in _texts(trace, until_armed) if text.startswith(REASONS)]
-    yield "reasons given", "; ".join(dict.fromkeys(reasons)) or None
+def _at(fits: ArrayLike) -> int | None:
+    """Return the index of the first true place that fits, or None."""
+    found = np.flatnonzero(fits)
+    return int(found[0]) if found.size else None
 
 
-def _standing(trace: Trace, mark: str) -> Named:
-    whole = trace.span(mark)
-    span = Span(max(whole.begin, whole.end - LOOKED_AT), whole.end)
-    rows = [each.message for each in trace.messages("LOCAL_POSITION_NED", span)]
-    yield from _spread("reported speed", [math.hypot(row.vx, row.vy) for row in rows])
-    mean = [statistics.fmean(getattr(row, name) for row in rows) for name in ("vx", "vy", "x", "y")]
-    yield "reported velocity, its mean", math.hypot(*mean[:2])
-    away = [math.dist((row.x, row.y), mean[2:]) for row in rows]
-    yield "reported position from its mean, p95", quantile(away, 0.95)
-    yaws = _unwrapped([each.message.yaw for each in trace.messages("ATTITUDE", span)])
-    yield "reported yaw, standard deviation", math.degrees(statistics.pstdev(yaws))
-    poses = trace.poses(span)
-    yield "true speed, max", max(abs(pose.speed) for pose in poses)
-    yield "truly turned", abs(_turned(poses))
-    states = trace.messages("EXTENDED_SYS_STATE", span)
-    yield "landed_state", states[-1].message.landed_state if states else None
-    if mark == "standing armed":
-        zeros = trace.poses(Span(trace.span(READYING).begin, span.end))
-        yield "turned by the first streamed zeros", abs(_turned(zeros))
+def _rest(it: Moment) -> int | None:
+    still = np.abs(it.speed) < STANDS
+    moved = np.cumsum(~still)
+    ends = np.searchsorted(it.time, it.time + STANDS_FOR).clip(max=len(moved) - 1)
+    return _at(still & (moved[ends] == moved))
 
 
-def _motion(trace: Trace, mark: str) -> Named:
-    """Measure one manoeuvre; which of these figures count, real.csv says."""
-    span = trace.span(mark)
-    poses = trace.poses(span)
-    if len(poses) < 2:
-        return
-    is_silent = mark.startswith("set-points end")
-    start = trace.set_points_ended if is_silent else span.begin
-    first, late = poses[0], poses[int(len(poses) * STEADY_FROM) :]
-    # PX4 follows a velocity over ground: its speed along the first heading
-    along = [p.speed * (math.cos(p.yaw - first.yaw) if trace.make.is_px4 else 1.0) for p in poses]
-    yield "speed at the start", first.speed
-    yield "steady speed", statistics.median(along[-len(late) :])
-    ended = [pose.speed for pose in poses if pose.time > span.end - 1.0]
-    yield "speed at the end", statistics.median(ended)
-    yield "top speed", max(abs(pose.speed) for pose in poses)
-    yield "rate reached", math.degrees(statistics.median(pose.yaw_rate for pose in late))
-    yield "turned", _turned(poses)
-    yield "turned either way", abs(_turned(poses))
-    yield "way", way(poses)
-    stood, within = _rest(poses, start)
-    yield "stands after", stood
-    yield "stands within", within
-    slower = (pose.time - start for pose in poses if pose.speed < 0.9 * first.speed)
-    yield "slower by a tenth after", next(slower, None)
-    if asked := ASKED.get(mark):
-        rises = zip(poses, along, strict=True)
-        risen = (pose.time - start for pose, speed in rises if speed / asked >= RISEN)
-        yield "reaches 63 % of what was asked", next(risen, None)
-    names = []
-    for each in trace.messages("HEARTBEAT", Span(start - 1.5 * HEARTBEAT_PERIOD, span.end)):
-        mode = MODES.get(each.message.custom_mode, f"mode {each.message.custom_mode}")
-        names.append(mode if each.message.base_mode & ARMED_FLAG else f"{mode} disarmed")
-    yield "modes", ", ".join(dict.fromkeys(names))
-    yield "texts", "; ".join(NUMBERS.sub("#", text) for text in _texts(trace, span)) or None
+def _when(index: Callable[[Moment], int | None], of: str, it: Moment) -> Value:
+    """Return the time or the way of a place, None if there is none."""
+    found = index(it)
+    return None if found is None else float(getattr(it, of)[found])
 
 
-def _home(trace: Trace) -> Named:
-    """When home follows the rover, and whether the origin stays."""
-    origins = {
-        (each.message.latitude, each.message.longitude)
-        for each in trace.heard.get("GPS_GLOBAL_ORIGIN", ())
-    }
-    yield "GPS_GLOBAL_ORIGIN, different places", len(origins)
-    rows = trace.heard["HOME_POSITION"]
-    moves = [after.at for before, after in pairwise(rows) if _moved(before.message, after.message)]
-
-    def within(*spans: Span) -> str:
-        is_moved = any(span.begin <= at <= span.end for at in moves for span in spans)
-        return "yes" if is_moved else "no"
-
-    yield "home moves when disarmed", within(trace.span("home: disarmed again"))
-    yield "home moves while driving", within(trace.span("home: driven"))
-    armed = [at for at, name in trace.marks if name == READYING][1:]
-    yield "home moves when armed", within(*(Span(at, at + ARMS_WITHIN) for at in armed))
+def _late(of: str, it: Moment) -> float:
+    """Return the median of the last part."""
+    values = getattr(it, of)
+    return float(np.median(values[int(len(values) * STEADY_FROM) :]))
 
 
-def _moved(one: Any, other: Any) -> bool:
-    north = (other.latitude - one.latitude) * 1e-7
-    east = (other.longitude - one.longitude) * 1e-7 * math.cos(math.radians(one.latitude * 1e-7))
-    return math.hypot(north, east) > HOME_MOVED
+def _turned(it: Moment) -> float:
+    return float(np.degrees(it.yaw[-1] - it.yaw[0]))
+
+
+def _slower(it: Moment) -> int | None:
+    return _at(it.speed < 0.9 * it.speed[0])
+
+
+def _risen(it: Moment) -> int | None:
+    return _at(it.along / ASKED[it.mark] >= RISEN)
+
+
+#: how each figure is measured, by its name in real.csv
+FIGURES: Mapping[str, Callable[[Moment], Value]] = {
+    "first LOCAL_POSITION_NED": partial(_first, "LOCAL_POSITION_NED"),
+    "first GPS_GLOBAL_ORIGIN": partial(_first, "GPS_GLOBAL_ORIGIN"),
+    "first HOME_POSITION": partial(_first, "HOME_POSITION"),
+    "pre-arm check healthy": partial(
+        _first, "SYS_STATUS", fits=lambda m: m.onboard_control_sensors_health & PREARM
+    ),
+    "arming accepted": partial(_accepted, mav.MAV_CMD_COMPONENT_ARM_DISARM, param=1.0),
+    "GUIDED accepted": partial(_accepted, mav.MAV_CMD_DO_SET_MODE, param=GUIDED),
+    "GUIDED lost again": lambda it: "yes" if _modes(it).count("MANUAL disarmed") else "no",
+    "arming refused, times": lambda it: len(_refusals(it)),
+    "arming refused with": lambda it: _joined(_refusals(it)),
+    "reasons given": lambda it: _joined([each for each in _texts(it) if each.startswith(REASONS)]),
+    "reported speed, p50": partial(_reported, 0.5),
+    "reported speed, p95": partial(_reported, 0.95),
+    "reported velocity, its mean": lambda it: float(
+        np.hypot(*it.fields("LOCAL_POSITION_NED", "vx", "vy").mean(axis=1))
+    ),
+    "reported position from its mean, p95": _wandered,
+    "reported yaw, standard deviation": lambda it: float(
+        np.degrees(np.unwrap(it.fields("ATTITUDE", "yaw")).std())
+    ),
+    "landed_state": _landed,
+    "home moves": _home_moves,
+    "speed at the start": lambda it: float(it.speed[0]),
+    "speed at the end": lambda it: float(np.median(it.speed[it.time > it.time[-1] - 1.0])),
+    "steady speed": partial(_late, "along"),
+    "top speed": lambda it: float(np.abs(it.speed).max()),
+    "rate reached": lambda it: float(np.degrees(_late("yaw_rate", it))),
+    "turned": _turned,
+    "turned either way": lambda it: abs(_turned(it)),
+    "way": lambda it: float(it.way[-1]),
+    "stands after": partial(_when, _rest, "time"),
+    "stands within": partial(_when, _rest, "way"),
+    "slower by a tenth after": partial(_when, _slower, "time"),
+    "reaches 63 % of what was asked": partial(_when, _risen, "time"),
+    "modes": lambda it: _joined(_modes(it), ", "),
+    "texts": lambda it: _joined([re.sub(r"\d+", "#", text) for text in _texts(it)]),
+}
+
+
+class Row(NamedTuple):
+    """One figure of a real rover, as real.csv has it."""
+
+    mark: str
+    figure: str
+    unit: str
+    floor: float
+    real: str
+    why: str
+
+    @property
+    def name(self) -> str:
+        """Its manoeuvre, what it is, and its unit."""
+        return f"{self.mark}: {self.figure}, {self.unit}".removesuffix(", ")
+
+    def is_right(self, value: Value) -> bool:
+        """Return whether a simulated value is near the real one, or what is allowed instead."""
+        real, _, instead = self.real.partition(" [")
+        least, is_range, most = instead.rstrip("]").partition("..")
+        if is_near(_value(real), value, floor=self.floor):
+            return True
+        if is_range:
+            return isinstance(value, float) and float(least) <= value <= float(most)
+        return value == least
+
+
+def rows_of(rover: str) -> Iterator[Row]:
+    """Yield each figure that the real rover of this name has."""
+    with Path(__file__).with_name("real.csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            if row[rover]:
+                floor, names = float(row["floor"]), (row["mark"], row["figure"], row["unit"])
+                yield Row(*names, floor, row[rover], row["why"] if "[" in row[rover] else "")
+
+
+def is_near(real: Value, simulated: Value, *, floor: float) -> bool:
+    """Return whether two values are within a factor of 1.5, or both within ± floor."""
+    if not isinstance(real, float) or not isinstance(simulated, int | float):
+        return real == simulated
+    if max(abs(real), abs(simulated)) <= floor or real == simulated:
+        return True
+    return real * simulated > 0.0 and 1.0 / FACTOR <= simulated / real <= FACTOR
+
+
+def _value(text: str) -> Value:
+    try:
+        return float(text)
+    except ValueError:
+        return None if text == NOTHING else text

@@ -7,12 +7,14 @@ one before.
 
 import asyncio
 import csv
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import radians
 from pathlib import Path
-from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
 from pymavlink.dialects.v20 import development as mav
 
 from rover_sim.observing.driver import Autopilot, Driver
@@ -24,7 +26,6 @@ from rover_sim.observing.track import Place, Track
 FIRST_HEARTBEAT = 1.0
 RETRY = 3.0  # s between two attempts to arm
 STILL, STILL_FOR = 0.15, 5.0  # m/s reported, s; then a rover stands
-ARMED, READYING = "armed for the first time", "arming and taking control"
 FAST, SLOW = 20.0, 5.0  # Hz
 ASK_PLACES, ASK_RATES = 2.0, 10  # s between requests of home; requests of rates after so many
 FAST_IDS = (mav.MAVLINK_MSG_ID_ATTITUDE, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
@@ -37,41 +38,62 @@ with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as _f
 ASKED = {mark: float(numbers.split()[0]) for mark, do, numbers, _ in ROWS if do == "stream"}
 
 
-class Span(NamedTuple):
-    """A time interval, s."""
+@dataclass(repr=False)  # the logs are long, and asyncio shows the result of a task
+class Moment:
+    """One manoeuvre, as a client and the judge of the truth saw it; times in s."""
 
+    mark: str
+    make: Autopilot
     begin: float
     end: float
-
-
-@dataclass(slots=True)
-class Trace:
-    """One drive through the manoeuvres, as a client and as the judge of the truth saw it."""
-
-    make: Autopilot
-    heard: dict[str, list[Heard]]
-    truth: Track
+    log: list[Heard]  # of the whole drive
     answers: list[Answer]
-    marks: list[tuple[float, str]]
-    set_points_ended: float  # s, before the manoeuvre in which there are none
+    places: list[Place]  # the true ones
 
-    def span(self, mark: str) -> Span:
-        """Return the interval from the first such mark to the next one; empty: not driven."""
-        names = [name for _, name in self.marks]
-        if mark not in names:
-            return Span(0.0, 0.0)
-        at = names.index(mark)
-        return Span(self.marks[at][0], self.marks[at + 1][0])
+    def heard(self, name: str, before: float = 0.0) -> list[Heard]:
+        """Return the messages of that name, also those since ``before`` seconds before it."""
+        first = bisect_left(self.log, self.begin - before, key=lambda row: row.at)
+        last = bisect_left(self.log, self.end, key=lambda row: row.at)
+        return [row for row in self.log[first:last] if row.name == name]
 
-    def messages(self, name: str, span: Span) -> list[Heard]:
-        """Return the messages of that name within the span."""
-        rows = self.heard.get(name, [])
-        first = bisect_left(rows, span.begin, key=lambda row: row.at)
-        return rows[first : bisect_right(rows, span.end, key=lambda row: row.at)]
+    def fields(self, name: str, *fields: str, before: float = 0.0) -> NDArray[np.float64]:
+        """Return a row of values for each field of those messages."""
+        rows = [[getattr(row.message, each) for each in fields] for row in self.heard(name, before)]
+        return np.array(rows).T
 
-    def poses(self, span: Span) -> list[Place]:
-        """Return the true places within the span."""
-        return self.truth.between(*span)
+    def _true(self, name: str) -> NDArray[np.float64]:
+        return np.array([getattr(place, name) for place in self.places])
+
+    @cached_property
+    def time(self) -> NDArray[np.float64]:
+        """Time of each true place since the beginning, s."""
+        return self._true("time") - self.begin
+
+    @cached_property
+    def yaw(self) -> NDArray[np.float64]:
+        """True yaw, rad, beyond a full turn if it turned that far."""
+        return np.unwrap(self._true("yaw"))
+
+    @cached_property
+    def speed(self) -> NDArray[np.float64]:
+        """True speed, m/s."""
+        return self._true("speed")
+
+    @cached_property
+    def along(self) -> NDArray[np.float64]:
+        """Speed as it was asked, m/s: a PX4 follows a velocity over ground."""
+        return self.speed * (np.cos(self.yaw - self.yaw[0]) if self.make.is_px4 else 1.0)
+
+    @cached_property
+    def yaw_rate(self) -> NDArray[np.float64]:
+        """True yaw rate, rad/s."""
+        return self._true("yaw_rate")
+
+    @cached_property
+    def way(self) -> NDArray[np.float64]:
+        """Metres driven from the first true place to each."""
+        steps = np.hypot(np.diff(self._true("north")), np.diff(self._true("east")))
+        return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 @dataclass
@@ -82,29 +104,32 @@ class Drive:
     truth: Track
     marks: list[tuple[float, str]] = field(default_factory=list)
 
-    async def run(self) -> Trace:
-        """Drive all manoeuvres."""
-        driver, observer, ended = self.driver, self.driver.observer, 0.0
+    async def run(self) -> dict[str, Moment]:
+        """Drive all manoeuvres; return the first of each mark."""
+        driver, observer = self.driver, self.driver.observer
         await observer.found(60.0)
         asking = asyncio.ensure_future(self._keep_asking())
         for mark, do, numbers, only in ROWS:
             if only not in ("", driver.make.name):
                 continue
-            if do == "stream":
+            if do == "stream" and not driver.is_ready:
+                self._mark("arming")
                 await self.ready()
             if mark:
                 self._mark(mark)
-            if mark.startswith("set-points end"):
-                ended = driver.last_setpoint_at
             await (getattr(self, do, None) or getattr(driver, do))(*map(float, numbers.split()))
         asking.cancel()
-        heard: dict[str, list[Heard]] = {}
-        for each in observer.log:
-            heard.setdefault(each.name, []).append(each)
-        return Trace(driver.make, heard, self.truth, observer.answers, self.marks, ended)
+        moments: dict[str, Moment] = {}
+        for number, (begin, mark) in enumerate(self.marks[:-1]):
+            end = self.marks[number + 1][0]
+            seen = (observer.log, observer.answers, self.truth.between(begin, end))
+            moments.setdefault(mark, Moment(mark, driver.make, begin, end, *seen))
+        return moments
 
     def _mark(self, name: str) -> None:
-        self.marks.append((self.driver.observer.now, name))
+        """Begin a moment now; the first one began with the first message."""
+        observer = self.driver.observer
+        self.marks.append((observer.now if self.marks else observer.log[0].at, name))
 
     async def _keep_asking(self) -> None:
         """Ask for places, and again for rates, which a restarted rover has lost."""
@@ -130,7 +155,7 @@ class Drive:
             await driver.hold()
             await driver.arm()
             await driver.observer.until(lambda: driver.is_armed, RETRY)
-        self._mark(ARMED)
+        self._mark("armed for the first time")
         await asyncio.sleep(1.0)
         await driver.arm(on=False)
         while not in_control:
@@ -144,10 +169,8 @@ class Drive:
         await asyncio.sleep(seconds)
 
     async def ready(self) -> None:
-        """Arm it in the mode that follows setpoints, if it is not."""
-        if not self.driver.is_ready:
-            self._mark(READYING)
-            await self.driver.get_ready(10)
+        """Arm it in the mode that follows setpoints."""
+        await self.driver.get_ready(10)
 
     async def stream(self, speed: float, seconds: float, rate: float = 0, aside: float = 0) -> None:
         """Stream a velocity; a PX4 rover gets one that turns at the rate."""

@@ -2,16 +2,15 @@
 
 import math
 import statistics
-from collections import Counter
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from mav_tasks.links.base import Link
 from mav_tasks.links.memory import Conditions, MemoryNet
 from rover_sim.body import Pose
-from rover_sim.check_vehicle.figures import Value, figures_of
-from rover_sim.check_vehicle.manoeuvres import Drive, Trace
+from rover_sim.check_vehicle.figures import FIGURES, Row, Value, rows_of
+from rover_sim.check_vehicle.manoeuvres import Drive, Moment
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.observing.driver import Driver
@@ -65,7 +64,7 @@ def in_its_world(make: Make, seed: int, run: Callable[[Link, Track], Coroutine[A
     return ground.run(run(ground.net.link("checker", peers=(ROVER,)), ground.truth))
 
 
-async def drive(link: Link, truth: Track) -> Trace:
+async def drive(link: Link, truth: Track) -> dict[str, Moment]:
     """Drive a rover through the manoeuvres."""
     observer = Observer(link, keeps=True)
     try:
@@ -74,15 +73,15 @@ async def drive(link: Link, truth: Track) -> Trace:
         observer.close()
 
 
-def measure(make: Make, *, seed: int, runs: int = RUNS) -> dict[tuple[str, str], Value]:
-    """Return the figures of a simulated rover, each the median of runs with seeds of their own."""
-    drives = [figures_of(in_its_world(make, seed + run, drive)) for run in range(runs)]
-    return {key: _middle([found[key] for found in drives]) for key in drives[0]}
+def measure(name: str, *, seed: int) -> Iterator[tuple[Row, Value]]:
+    """Yield each figure of a real rover with its simulated value, the median of some runs."""
+    drives = [in_its_world(ROVERS[name], seed + run, drive) for run in range(RUNS)]
+    for row in rows_of(name):
+        look = FIGURES[row.figure]
+        yield row, _middle([look(moments[row.mark]) for moments in drives])
 
 
 def _middle(values: list[Value]) -> Value:
     """Return the median of numbers; for words, or if some are None, the most frequent value."""
-    numbers = [value for value in values if isinstance(value, int | float)]
-    if len(numbers) == len(values):
-        return statistics.median(numbers)
-    return Counter(values).most_common(1)[0][0]
+    numbers = [float(value) for value in values if isinstance(value, int | float)]
+    return statistics.median(numbers) if len(numbers) == len(values) else statistics.mode(values)
