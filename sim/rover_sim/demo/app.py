@@ -6,32 +6,29 @@ order, states and the measured movement are correct; 1: some are wrong; 2: it ca
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 from typer import Option
 
-from mav_tasks.basics.errors import RecordError
+from mav_tasks.basics.errors import MavTasksError
 from rover_sim.bullet import NO_PYBULLET, has_pybullet
 from rover_sim.demo import fast as virtual
 from rover_sim.demo import real
-from rover_sim.demo.screen import Screen
-from rover_sim.demo.third_party import problems
 from rover_sim.errors import MissingExtra
 from rover_sim.observing.picture import draw
+from rover_sim.observing.track import Track
 from rover_sim.testing.processes import ProcessFailed
 
 PICTURE = "track.png"
 USAGE = 2
 
 NO_PICTURE = (
-    "demo: no picture of the track: it needs matplotlib, which is not installed"
-    " (pip install matplotlib)"
+    "no picture of the track: it needs matplotlib, which is not installed (pip install matplotlib)"
 )
-NO_WINDOW = "demo: --gui shows pybullet's window: it needs pybullet, and cannot be used with --fast"
-
-NO_PAGE = "demo: --web needs real time, and cannot be used with --fast"
-NO_FLEET = "demo: --fleet cannot be used with --fast, --web, --gui or --record"
+NO_WINDOW = "--gui shows pybullet's window: it needs pybullet, and cannot be used with --fast"
+NO_PAGE = "--web needs real time, and cannot be used with --fast"
+NO_FLEET = "--fleet cannot be used with --fast, --web, --gui or --record"
 
 
 def demo(
@@ -58,52 +55,45 @@ def demo(
     ] = 0,
 ) -> None:
     """Run the demonstration: three tasks, driven and measured."""
-    screen = Screen()
     kind = body or ("bullet" if has_pybullet() else "kinematic")
     if body is None and kind == "kinematic":
-        screen.say(f"demo: {NO_PYBULLET}")
+        _say(NO_PYBULLET)
     for is_wrong, words in (
         (gui and (fast or kind != "bullet"), NO_WINDOW),
         (web and fast, NO_PAGE),
         (fleet and (fast or web or gui or record), NO_FLEET),
     ):
         if is_wrong:
-            screen.say(words)
+            _say(words)
             raise typer.Exit(USAGE)
-    how = {"body": kind, "seed": seed, "record": record}
     try:
         if fleet:
             from rover_sim.demo import fleet as gateways  # noqa: PLC0415  # needs more packages
 
-            wrong = gateways.drive(screen, body=kind)
+            wrong = gateways.drive(body=kind)
         else:
-            wrong = _run(screen, output, how, fast=fast, gui=gui, web=web)
-    except (ProcessFailed, MissingExtra, RecordError) as error:
-        screen.say(f"demo: {error}")
+            if fast:
+                party, track = virtual.drive(body=kind, seed=seed, record=record)
+            else:
+                party, track = real.drive(body=kind, seed=seed, record=record, gui=gui, web=web)
+            wrong = party.conclude()
+            if not gui:
+                _draw(track, output.resolve() / PICTURE)
+    except (ProcessFailed, MissingExtra, MavTasksError, OSError) as error:
+        _say(str(error))
         raise typer.Exit(USAGE) from error
-    screen.say(f"demo: {wrong} wrong" if wrong else "demo: all correct")
+    _say(f"{wrong} wrong" if wrong else "all correct")
     raise typer.Exit(int(wrong > 0))
 
 
-def _run(
-    screen: Screen, output: Path, how: dict[str, Any], *, fast: bool, gui: bool, web: bool
-) -> int:
-    """Show the three tasks; return how much went wrong."""
-    with screen.live():
-        if fast:
-            party, track = virtual.drive(screen, **how)
-        else:
-            party, track = real.drive(screen, **how, gui=gui, web=web)
-    screen.conclude(party)
-    if track and not gui:
-        picture = output.resolve() / PICTURE
-        try:
-            draw({"Track of the rover": track.places}, picture)
-        except ImportError:
-            screen.say(NO_PICTURE)
-        else:
-            screen.say(f"picture of the track: {picture}")
-    wrong = problems(party)
-    for problem in wrong:
-        screen.say(f"WRONG: {problem}")
-    return len(wrong)
+def _draw(track: Track, picture: Path) -> None:
+    try:
+        draw({"Track of the rover": track.places}, picture)
+    except ImportError:
+        _say(NO_PICTURE)
+    else:
+        typer.echo(f"picture of the track: {picture}")
+
+
+def _say(text: str) -> None:
+    typer.echo(f"demo: {text}")

@@ -1,14 +1,12 @@
 """The demonstration in virtual time: one process, the same server, rover and third party."""
 
-import asyncio
-from collections.abc import Callable
+import typer
 
 from mav_tasks.config.settings import Recording, Settings
 from mav_tasks.recording import observers
 from mav_tasks.shell.in_memory import CLIENT_LINK, InMemoryServer
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
-from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import ThirdParty
 from rover_sim.kinematic import KinematicBody
 from rover_sim.observing.observer import Observer
@@ -16,51 +14,34 @@ from rover_sim.observing.track import Track
 from rover_sim.observing.virtual import ROVER, VirtualGround
 from rover_sim.vehicle import make_vehicle
 
-REFRESH = 0.2  # s
 SLIP = 0.3
 
 
-def drive(screen: Screen, *, body: str, seed: int, record: str) -> tuple[ThirdParty, Track]:
+def drive(*, body: str, seed: int, record: str) -> tuple[ThirdParty, Track]:
     """Run server, rover and third party; return the third party and the true track.
 
     ``record`` is the folder for a record of the server's decisions, "" for none.
     """
     settings = Settings()
     recorders = observers(Recording(decisions=record), settings, None, now=0.0)
-    physics = _body(body, seed)
+    physics: Body = (
+        KinematicBody(start=Pose(), slip=SLIP, seed=seed or None)
+        if body == "kinematic"
+        else BulletBody(start=Pose(), variation=SLIP if seed else 0.0, seed=seed)
+    )
     ground = VirtualGround(make_vehicle(physics, system_id=1, now=0.0, seed=seed))
     net, track = ground.net, ground.truth
     server = InMemoryServer(net, vehicles=(ROVER,), settings=settings, observers=recorders)
 
     def say(text: str) -> None:
-        screen.say(f"{ground.world.now:6.1f} s  {text}")
+        typer.echo(f"{ground.world.now:6.1f} s  {text}")
 
     async def run() -> ThirdParty:
         observer = Observer(net.link("third party", peers=(CLIENT_LINK,)))
-        return await follow(ThirdParty(observer, lambda: track.last, say), screen)
+        return await ThirdParty(observer, lambda: track.last, say).run()
 
     party = ground.run(run(), server)
     physics.close()
     for recorder in recorders:
         recorder.close()
     return party, track
-
-
-def _body(kind: str, seed: int) -> Body:
-    if kind == "kinematic":
-        return KinematicBody(start=Pose(), slip=SLIP, seed=seed or None)
-    return BulletBody(start=Pose(), variation=SLIP if seed else 0.0, seed=seed)
-
-
-async def follow(
-    party: ThirdParty, screen: Screen, check: Callable[[], None] = lambda: None
-) -> ThirdParty:
-    """Let the third party do its part, show it, and ``check`` now and then."""
-    driving = asyncio.ensure_future(party.run())
-    while not driving.done():
-        check()
-        screen.update(party)
-        await asyncio.sleep(REFRESH)
-    await driving
-    screen.update(party)
-    return party

@@ -1,40 +1,34 @@
-"""A third party: pymavlink's stock messages over a link, and no knowledge of mav-tasks' own.
+"""A third party: it submits three tasks by pymavlink's stock messages, follows and measures them.
 
-It submits each task once the previous one is acknowledged, and records their states.
+It submits each task once the previous one is acknowledged.
 """
 
 import math
-import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from rich.console import Console
+from rich.table import Table
+
+from mav_tasks.mavlink.codec import Decoder
+from mav_tasks.mavlink.messages import TaskStatus
+from mav_tasks.tasks.lifecycle import TaskState
 from rover_sim.observing.observer import AUTOPILOT, Answer, Heard, Observer
 from rover_sim.observing.track import Place
 
+REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, STATUS_INTERVAL = 512, 511, 200_000  # µs
 TASK_MOVE, TASK_ROTATE = 54000, 54001
-REQUEST_MESSAGE, SET_MESSAGE_INTERVAL = 512, 511
-TASK_STATUS, TASK_STATUS_FORM = 54000, "<5I4f4H10B50sI"
 TASK_SERVER = 191
-STATES: tuple[str, ...] = (
-    "unknown",
-    "scheduled",
-    "blocked",
-    "queued",
-    "starting",
-    "executing",
-    "paused",
-)
-STATES += ("cancelling", "held", "completed", "failed", "cancelled", "killed", "expired")
-STARTING, EXECUTING, FIRST_OVER = 4, 5, 9
+STARTING, EXECUTING, COMPLETED = 4, 5, 9  # from COMPLETED on, a task is over
 POSITIONS = 5  # LOCAL_POSITION_NED messages until the rover counts as present
-PROGRESS_INTERVAL_US = 200_000
 ASK_AGAIN = 0.5  # s
 PATIENCE = 85.0  # s, for everything
+PIPE_WIDTH = 110  # columns, if the output is no terminal
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
-    """One task of the tutorial."""
+@dataclass(slots=True)
+class Task:
+    """One task of the tutorial, and what is known of it."""
 
     name: str
     command: int
@@ -42,32 +36,18 @@ class Leg:
     unit: str
     priority: int
     tolerance: float  # the rover's own estimate is off by 2 to 4 cm
-
-    def __str__(self) -> str:
-        return f"{self.name} {self.amount:g} {self.unit}"
-
-
-LEGS = (
-    Leg("forward", TASK_MOVE, 2.0, "m", 3, 0.05),
-    Leg("rotate", TASK_ROTATE, 90.0, "deg", 8, 1.0),
-    Leg("forward", TASK_MOVE, 1.5, "m", 5, 0.05),
-)
-
-
-@dataclass(slots=True)
-class Seen:
-    """The third party's knowledge of one of its tasks."""
-
-    leg: Leg
     is_accepted: bool | None = None
     task_id: int = 0
     state: int = 0
     text: str = ""
-    progress: int = 0
-    position: int | None = None  # in the queue
     seconds: float = math.nan
     began: Place | None = None
     ended: Place | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended or was refused."""
+        return self.state >= COMPLETED or self.is_accepted is False
 
     @property
     def measured(self) -> float:
@@ -75,53 +55,68 @@ class Seen:
         one, other = self.began, self.ended
         if one is None or other is None:
             return math.nan
-        if self.leg.command == TASK_ROTATE:
+        if self.unit == "deg":
             return math.degrees(math.remainder(other.yaw - one.yaw, math.tau))
         north, east = other.north - one.north, other.east - one.east
         return north * math.cos(one.yaw) + east * math.sin(one.yaw)
 
+    @property
+    def state_name(self) -> str:
+        """The state in words."""
+        return TaskState(self.state).name.lower()
+
+
+def tutorial() -> list[Task]:
+    """Return the three tasks, in the order in which they are submitted and should run."""
+    return [
+        Task("forward", TASK_MOVE, 2.0, "m", priority=3, tolerance=0.05),
+        Task("rotate", TASK_ROTATE, 90.0, "deg", priority=8, tolerance=1.0),
+        Task("forward", TASK_MOVE, 1.5, "m", priority=5, tolerance=0.05),
+    ]
+
 
 @dataclass
 class ThirdParty:
-    """Submits LEGS and follows them; ``truth`` returns the true pose, ``say`` prints a line."""
+    """Submits the tasks and follows them.
+
+    ``truth`` returns the true pose, ``say`` prints a line, ``check`` raises to end it early.
+    """
 
     observer: Observer
     truth: Callable[[], Place]
     say: Callable[[str], None]
-    tasks: list[Seen] = field(default_factory=lambda: [Seen(leg) for leg in LEGS])
-    order: list[int] = field(default_factory=list)  # of execution, as indices of LEGS
+    check: Callable[[], None] = lambda: None
+    tasks: list[Task] = field(default_factory=tutorial)
     _positions: int = 0
+    _decoder: Decoder = field(default_factory=Decoder)
 
-    async def run(self) -> None:
+    async def run(self) -> "ThirdParty":
         """Submit, and wait for the end; give up after PATIENCE."""
         self.observer.listeners.append(self._take)
         end = self.observer.now + PATIENCE
         await self.observer.until(lambda: self._positions >= POSITIONS, PATIENCE)
-        await self._command(SET_MESSAGE_INTERVAL, TASK_STATUS, PROGRESS_INTERVAL_US)
+        await self._command(SET_MESSAGE_INTERVAL, TaskStatus.id, STATUS_INTERVAL)
         first = self.tasks[0]
         for task in self.tasks:
             await self._submit(task)
             if first.is_accepted:  # it must start at once, so that later ones wait
                 await self.observer.until(lambda: first.state >= STARTING, PATIENCE)
-        while not self.is_over and self.observer.now < end:
+        while not self._is_over() and self.observer.now < end:
+            self.check()
             for task in self.tasks:
                 if task.state < EXECUTING:
-                    await self._command(REQUEST_MESSAGE, TASK_STATUS, task.task_id)
-            await self.observer.until(lambda: self.is_over, ASK_AGAIN)
-        if not self.is_over:
-            self.say(f"gave up after {PATIENCE:.0f} s")
+                    await self._command(REQUEST_MESSAGE, TaskStatus.id, task.task_id)
+            await self.observer.until(self._is_over, ASK_AGAIN)
+        return self
 
-    @property
-    def is_over(self) -> bool:
-        """Whether every task has ended or was refused."""
-        return all(task.state >= FIRST_OVER or task.is_accepted is False for task in self.tasks)
+    def _is_over(self) -> bool:
+        return all(task.is_over for task in self.tasks)
 
-    async def _submit(self, task: Seen) -> None:
-        leg = task.leg
-        answer = await self._command(leg.command, leg.amount, 0, 0, 0, 0, 0, leg.priority)
+    async def _submit(self, task: Task) -> None:
+        answer = await self._command(task.command, task.amount, 0, 0, 0, 0, 0, task.priority)
         task.is_accepted, task.task_id = answer.is_accepted, answer.extra
-        result = str(answer).partition(" ")[0]
-        self.say(f"COMMAND_ACK {result}: {leg} at priority {leg.priority} is task {task.task_id}")
+        result, what = str(answer).partition(" ")[0], f"{task.name} {task.amount:g} {task.unit}"
+        self.say(f"COMMAND_ACK {result}: {what} at priority {task.priority} is task {answer.extra}")
 
     async def _command(self, number: int, *params: float) -> Answer:
         return await self.observer.command(number, *params, component=TASK_SERVER)
@@ -133,43 +128,57 @@ class ThirdParty:
         elif heard.name == "STATUSTEXT" and not heard.message.text.startswith("Task "):
             who = "server" if component == TASK_SERVER else "rover"
             self.say(f"{who} says: {heard.message.text}")
-        elif heard.packet.message_id == TASK_STATUS:
-            self._take_status(heard.packet.payload)
+        elif isinstance(status := self._decoder.decode(heard.packet), TaskStatus):
+            for task in self.tasks:
+                if task.task_id == status.task_id and status.state >= task.state:
+                    self._follow(task, status.state, status.text)
+                    task.seconds = status.execution_time
 
-    def _take_status(self, payload: bytes) -> None:
-        size = struct.calcsize(TASK_STATUS_FORM)
-        fields = struct.unpack(TASK_STATUS_FORM, payload[:size].ljust(size, b"\0"))
-        state, text = fields[15], fields[23].split(b"\0")[0].decode("utf-8", "replace")
-        for index, task in enumerate(self.tasks):
-            if task.task_id != fields[1] or state < task.state:
-                continue
-            task.seconds, task.progress = fields[8], fields[18]
-            task.position = None if fields[10] == 0xFFFF else fields[10]
-            if state != task.state and state == EXECUTING:
-                task.began = self.truth()
-                self.order.append(index)
-            elif state != task.state and state >= FIRST_OVER:
-                task.ended = self.truth()
-            if text != task.text:
-                self.say(f"task {task.task_id}: {text}")
-            task.state, task.text = state, text
+    def _follow(self, task: Task, state: int, text: str) -> None:
+        if state != task.state and state == EXECUTING:
+            task.began = self.truth()
+        elif state != task.state and state >= COMPLETED:
+            task.ended = self.truth()
+        if text != task.text:
+            self.say(f"task {task.task_id}: {text}")
+        task.state, task.text = state, text
 
+    def order(self, task: Task) -> int:
+        """Return which one a task was in the order of execution, from 1; 0 if it did not run."""
+        began = sorted(each.began.time for each in self.tasks if each.began)
+        return 1 + began.index(task.began.time) if task.began else 0
 
-def problems(party: ThirdParty) -> list[str]:
-    """Return a description of every deviation from the expected result."""
-    found = []
-    ids = [task.task_id for task in party.tasks]
-    if not all(task.is_accepted for task in party.tasks):
-        found.append("a submission was not accepted")
-    if len(set(ids)) != len(ids) or 0 in ids:
-        found.append(f"task ids {ids} are not three different ones")
-    if party.order != [0, 1, 2]:
-        found.append(f"order of execution {[ids[i] for i in party.order]}, not {ids}")
-    for task in party.tasks:
-        label, leg = f"task {task.task_id} ({task.leg.name})", task.leg
-        if STATES[task.state] != "completed":
-            found.append(f"{label} is {STATES[task.state]}, not completed")
-        error = abs(task.measured - leg.amount)
-        if not error <= leg.tolerance:
-            found.append(f"{label} is off by {error:.3f} {leg.unit}, allowed {leg.tolerance}")
-    return found
+    def conclude(self) -> int:
+        """Print a table, and every deviation from the expected result; return how many."""
+        table = Table(title="What the rover did")
+        for heading in "id", "type", "prio", "order", "state", "time", "asked", "measured", "error":
+            table.add_column(heading, justify="left" if heading in ("type", "state") else "right")
+        for task in self.tasks:
+            digits = (
+                3 if task.unit == "m" else 2
+            )  # measured and error in the unit of what was asked
+            table.add_row(
+                *(str(task.task_id), task.name, str(task.priority), str(self.order(task) or "-")),
+                *(task.state_name, f"{task.seconds:.1f} s", f"{task.amount:g} {task.unit}"),
+                *(f"{task.measured:.{digits}f}", f"{task.measured - task.amount:+.{digits}f}"),
+            )
+        console = Console()
+        (console if console.is_terminal else Console(width=PIPE_WIDTH)).print(table)
+        wrong = list(self._problems())
+        for problem in wrong:
+            self.say(f"WRONG: {problem}")
+        return len(wrong)
+
+    def _problems(self) -> Iterator[str]:
+        ids = [task.task_id for task in self.tasks]
+        if len(set(ids)) != len(ids) or 0 in ids:
+            yield f"task ids {ids} are not three different ones"
+        for place, task in enumerate(self.tasks, start=1):
+            label = f"task {task.task_id} ({task.name})"
+            if task.state != COMPLETED:
+                yield f"{label} is {task.state_name}, not completed"
+            if self.order(task) != place:
+                yield f"{label} was number {self.order(task)} to run, not {place}"
+            error = abs(task.measured - task.amount)
+            if not error <= task.tolerance:
+                yield f"{label} is off by {error:.3f} {task.unit}, allowed {task.tolerance}"
