@@ -2,8 +2,7 @@
 
 contract.csv has the checks: how each looks (a method of ``Rover``), with what, and what must be
 seen: a number within ``least..most``, or words by a regular expression. Nothing moves or stays
-changed: the mode of a disarmed rover is changed and set back, and one parameter is set to its
-present value.
+changed: the mode of a disarmed rover is changed and set back.
 """
 
 import asyncio
@@ -14,8 +13,7 @@ from collections.abc import AsyncIterator, Collection
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from struct import pack, unpack
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import development as mav
 
@@ -28,14 +26,10 @@ AFTERMATH = 0.2  # s in which a duplicate answer would come
 SHOWN_WITHIN = 2.5  # s until a heartbeat shows a mode or arming
 ARMED_WITHIN = 15.0  # s in which a rover may still refuse after its start
 REORDERED = 8  # packets that another one overtakes; PX4 1.17 sometimes swaps two
-LIST_QUIET = 1.5  # s without a new parameter end the list
-ROUNDS = 3  # of reading missing ones by index
-UNNUMBERED = 65535  # param_index of a change that nobody asked for
-REAL32 = 9  # MAV_PARAM_TYPE
+BY_NAME = -1  # param_index in a request
 REQUEST, VERSION = mav.MAV_CMD_REQUEST_MESSAGE, mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION
 
 NONSENSE = 99 << 16 | 99  # a mode that does not exist; of PX4 a main mode
-OWN_ID = "SYSID_THISMAV MAV_SYSID MAV_SYS_ID"  # parameters of which one shows the system id
 #: parameters without which QGroundControl asks for setup when it connects, by make
 NEEDED = {
     "ardupilot": "RCMAP_ROLL RCMAP_PITCH RCMAP_THROTTLE RCMAP_YAW FRAME_CLASS COMPASS_DEV_ID "
@@ -152,71 +146,16 @@ class Rover:
         other = 1 + self.observer.system % 250
         return str(await self.observer.command(REQUEST, VERSION, system=other))
 
-    # parameters
-
-    def _parameters(self) -> dict[str, Any]:
-        """Return those of the list by name.
-
-        ArduPilot sends parameters that it changes itself without an index (4.6.3), PX4 its
-        _HASH_CHECK.
-        """
-        rows = (heard.message for heard in self.observer.since(0, "PARAM_VALUE"))
-        return {row.param_id: row for row in rows if row.param_index != UNNUMBERED}
-
-    async def _read(self, name: str, index: int = -1) -> Any:
-        """Return a parameter that is read by its name or index, or None."""
-        out = self.observer.out
-        return await self._value(
-            out.param_request_read_encode(*self._target, name.encode(), index), name, index
-        )
-
-    async def _value(self, asking: Any, name: str, index: int = -1) -> Any:
-        self.observer.send(asking)
-        return await self.observer.wait(
-            "PARAM_VALUE", PATIENCE, lambda m: name == m.param_id or index == m.param_index
-        )
-
-    async def read_list(self) -> Value:
-        """Read the whole list, and what is missing by index; return how many are wrong."""
-        self.observer.send(self.observer.out.param_request_list_encode(*self._target))
-        while await self.observer.wait("PARAM_VALUE", LIST_QUIET):
-            pass
-        wanted = {index for row in self._parameters().values() for index in range(row.param_count)}
-        missing = wanted
-        for _ in range(ROUNDS):
-            missing = wanted - {row.param_index for row in self._parameters().values()}
-            for index in missing:
-                await self._read("", index)
-        return len(missing) + abs(len(wanted) - len(self._parameters())) if wanted else math.nan
-
-    async def single_reads(self) -> Value:
-        """Read one by its name and by its index, and set it, a float, to what it is."""
-        reals = (each for each in self._parameters().values() if each.param_type == REAL32)
-        real = next(reals, None)
-        if real is None:
-            return None
-        name, value, out = real.param_id, real.param_value, self.observer.out
-        setting = out.param_set_encode(*self._target, name.encode(), value, REAL32)
-        found = [await self._read(name), await self._read("", real.param_index)]
-        found.append(await self._value(setting, name))
-        return float(sum(each is None or each.param_value != value for each in found))
-
-    async def encoding(self) -> Value:
-        """Read the system id out of its parameter; return how far it is off."""
-        listed = self._parameters()
-        own = next((listed[name] for name in OWN_ID.split() if name in listed), None)
-        if own is None:
-            return None
-        value = own.param_value
-        if self.driver.make.is_px4 and own.param_type != REAL32:
-            (value,) = unpack("<i", pack("<f", value))
-        return float(value - self.observer.system)
-
     async def missing(self) -> Value:
-        """Look for what QGroundControl needs; a checksum of the list is not in it."""
-        needed = NEEDED.get(self.driver.make.name, "").split()
-        absent = [name for name in needed if name not in self._parameters()]
-        return ", ".join([name for name in absent if await self._read(name) is None])
+        """Read the parameters that QGroundControl needs."""
+        out, wait = self.observer.out, self.observer.wait
+        absent = []
+        for name in NEEDED.get(self.driver.make.name, "").split():
+            asking = out.param_request_read_encode(*self._target, name.encode(), BY_NAME)
+            self.observer.send(asking)
+            if not await wait("PARAM_VALUE", PATIENCE, lambda m, name=name: m.param_id == name):
+                absent.append(name)
+        return ", ".join(absent)
 
     # modes and arming
 
