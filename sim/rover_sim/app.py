@@ -9,7 +9,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from math import isfinite, nan, radians
 from pathlib import Path
@@ -41,8 +41,6 @@ KINEMATIC_SLIP = 0.3  # as for the pybullet rover
 TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
 HOME_FIELDS = 4
 PULSES = (800, 2200)  # µs, the range of a receiver
-FASTEST = 1000.0  # simulated seconds per second
-MAX_FRICTION = 5.0  # above that of rubber on any surface
 USAGE_ERROR = 2  # exit status, as Typer's own
 ABORTED = 134  # a shell's status for SIGABRT, with which a crashing SITL ends
 
@@ -90,31 +88,18 @@ class StartError(Exception):
     """The simulator cannot start; the message is one line for the user."""
 
 
-def _number(text: str, is_good: Callable[[float], bool], what: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
+def between(least: float, most: float) -> Callable[[str | float], float]:
+    """Return a parser of a number within these; "real" is 1. It raises BadParameter."""
+
+    def read(given: str | float) -> float:
         value = nan
-    if not is_good(value):  # NaN is never good
-        raise BadParameter(f"must be {what}, not {text!r}")
-    return value
+        with suppress(ValueError):
+            value = float("1" if given == "real" else given)
+        if not least <= value <= most:  # NaN never is
+            raise BadParameter(f"must be {least:g} to {most:g}, not {given!r}")
+        return value
 
-
-def read_speed(text: str) -> float:
-    """Parse ``--speed``. Raise BadParameter."""
-    what = f"'real' or a number above 0, at most {FASTEST:g}"
-    return 1.0 if text == "real" else _number(text, lambda speed: 0.0 < speed <= FASTEST, what)
-
-
-def read_friction(text: str) -> float:
-    """Parse ``--friction``. Raise BadParameter."""
-    what = f"above 0, at most {MAX_FRICTION:g}"
-    return _number(text, lambda friction: 0.0 < friction <= MAX_FRICTION, what)
-
-
-def read_variation(text: str) -> float:
-    """Parse ``--friction-variation``. Raise BadParameter."""
-    return _number(text, lambda variation: 0.0 <= variation < 1.0, "0 or more, below 1")
+    return read
 
 
 def sim(
@@ -146,12 +131,14 @@ def sim(
     ] = None,
     friction: Annotated[
         float,
-        Option(parser=read_friction, metavar="NUMBER", help="Friction between tyres and ground."),
+        Option(
+            parser=between(0.01, 5.0), metavar="NUMBER", help="Friction between tyres and ground."
+        ),
     ] = 0.8,
     friction_variation: Annotated[
         float,
         Option(
-            parser=read_variation,
+            parser=between(0.0, 0.99),
             metavar="NUMBER",
             help="Random variation of the friction: 0.3 for 30 %; needs --seed.",
         ),
@@ -162,7 +149,7 @@ def sim(
     speed: Annotated[
         float,
         Option(
-            parser=read_speed,
+            parser=between(0.01, 1000.0),
             metavar="real|NUMBER",
             show_default="real",
             help="Simulated seconds per real second.",

@@ -8,7 +8,7 @@ from typing import TextIO
 
 from mav_tasks.links.base import Link
 from rover_sim.fault_player import FaultPlayer
-from rover_sim.vehicle import Vehicle
+from rover_sim.vehicle import Vehicle, exchange
 
 DATAGRAMS_PER_TURN = 64  # then the rovers get their turn
 TRUTH_INTERVAL = 0.1  # s
@@ -45,17 +45,11 @@ def drive(
             ready = selector.select(max(0.0, (deadline - clock.now()) / clock.speed))
             if any(key.fileobj is stop for key, _ in ready):
                 return
-            for peer, data in link.receive(DATAGRAMS_PER_TURN) if ready else ():
-                for vehicle in vehicles:
-                    vehicle.receive(data, peer, now=clock.now())
             now = clock.now()
             for line in faults.play(now - clock.start, now=now):
                 sys.stdout.write(f"rover_sim: {line}\n")
                 sys.stdout.flush()
-            for vehicle in vehicles:
-                vehicle.handle_deadline(now=now)
-                for peer, packet in vehicle.take_packets():
-                    link.send(peer, packet)
+            exchange(link, vehicles, now, DATAGRAMS_PER_TURN if ready else 0)
             if truth is not None and now >= truth_due:
                 _write_truth(truth, vehicles, now - clock.start)
                 truth_due = max(truth_due + TRUTH_INTERVAL, now)

@@ -34,10 +34,12 @@ Fields = tuple[Any, ...]
 class Telemetry:
     """Builds every message that the rover can send about itself.
 
-    The method for a message has its name, after ``tell_``; it takes the estimate, and the
-    milliseconds since boot, and returns the message's fields in their order, or None if there is
-    nothing to send.
+    The method for a message has its name, after ``tell_``; it returns the message's fields in their
+    order, or None if there is nothing to send.
     """
+
+    _estimate: Estimate  # of the present message
+    _boot_ms: int  # ms since boot, of the present message
 
     def __init__(self, on: Onboard, *, unix_offset: float) -> None:
         self._on = on
@@ -49,16 +51,17 @@ class Telemetry:
         is_accepted = message_id in self._on.persona.accepted_in_silence
         return is_accepted or self._method_of(message_id) is not None
 
-    def _method_of(self, message_id: int) -> Callable[[Estimate, int], Fields | None] | None:
+    def _method_of(self, message_id: int) -> Callable[[], Fields | None] | None:
         if message_id not in m.ALL or message_id in self._on.persona.lacks:
             return None
         return getattr(self, f"tell_{m.ALL[message_id].msgname.lower()}", None)
 
     def build(self, message_id: int, estimate: Estimate, now: float) -> Message | None:
         """Return the present message; None if there is nothing to send."""
-        boot_ms = int((now - self._on.started) * 1000.0 + 0.5)
+        self._estimate = estimate
+        self._boot_ms = int((now - self._on.started) * 1000.0 + 0.5)
         method = self._method_of(message_id)
-        fields = None if method is None else method(estimate, boot_ms)
+        fields = None if method is None else method()
         if fields is None:
             return None
         message: Message = m.ALL[message_id](*fields)
@@ -68,7 +71,7 @@ class Telemetry:
             message.time_boot_ms %= OVERFLOW
         return message
 
-    def tell_heartbeat(self, *_: object) -> Fields:
+    def tell_heartbeat(self) -> Fields:
         flight, persona = self._flight, self._on.persona
         armed = MavModeFlag.SAFETY_ARMED if flight.armed else 0
         return (
@@ -80,11 +83,11 @@ class Telemetry:
             MAVLINK_VERSION,
         )
 
-    def tell_sys_status(self, _estimate: Estimate, boot_ms: int) -> Fields:
+    def tell_sys_status(self) -> Fields:
         persona, faults = self._on.persona, self._on.outbox.faults
         present = SENSORS if persona.enables_prearm else SENSORS & ~PREARM
         healthy = present | persona.also_healthy | PREARM
-        if not self._is_over("healthy", boot_ms):
+        if not self._is_over("healthy"):
             healthy &= ~PREARM
         enabled = present
         if faults.outside_fence and persona.also_healthy & GEOFENCE:
@@ -92,36 +95,36 @@ class Telemetry:
         # load 10 %, 12.6 V, 5 A
         return present, enabled, healthy, 100, 12600, 500, faults.battery, *(0,) * 6
 
-    def tell_extended_sys_state(self, *_: object) -> Fields:
+    def tell_extended_sys_state(self) -> Fields:
         armed, disarmed = self._on.persona.landed_states
         return 0, armed if self._flight.armed else disarmed
 
-    def tell_system_time(self, _estimate: Estimate, boot_ms: int) -> Fields:
-        unix = self._unix_offset + self._on.started + boot_ms * 1e-3 if self._unix_offset else 0.0
-        return int(unix * 1e6), boot_ms
+    def tell_system_time(self) -> Fields:
+        unix = self._unix_offset + self._time if self._unix_offset else 0.0
+        return int(unix * 1e6), self._boot_ms
 
-    def tell_attitude(self, estimate: Estimate, boot_ms: int) -> Fields:
-        e, has_heading = estimate, self._is_over("heading", boot_ms)
+    def tell_attitude(self) -> Fields:
+        e, has_heading = self._estimate, self._is_over("heading")
         yaw = e.yaw if has_heading else 0.0
-        return boot_ms, e.roll, e.pitch, yaw, 0.0, 0.0, e.yaw_rate
+        return self._boot_ms, e.roll, e.pitch, yaw, 0.0, 0.0, e.yaw_rate
 
-    def tell_local_position_ned(self, estimate: Estimate, boot_ms: int) -> Fields | None:
-        if not self._is_over("position", boot_ms):
+    def tell_local_position_ned(self) -> Fields | None:
+        if not self._is_over("position"):
             return None
-        e = estimate
-        return boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0
+        e = self._estimate
+        return self._boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0
 
-    def tell_global_position_int(self, estimate: Estimate, boot_ms: int) -> Fields:
-        e, heading = estimate, _centidegrees(estimate.yaw)
-        if not self._is_over("position", boot_ms):
-            return boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading
+    def tell_global_position_int(self) -> Fields:
+        e, heading = self._estimate, _centidegrees(self._estimate.yaw)
+        if not self._is_over("position"):
+            return self._boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading
         place = self._on.origin.to_global_cut(e.north, e.east)
         velocity = (_cm(e.vn), _cm(e.ve), 0)
-        return boot_ms, *place, self._altitude(e), round(-e.down * 1e3), *velocity, heading
+        return self._boot_ms, *place, self._altitude(e), round(-e.down * 1e3), *velocity, heading
 
-    def tell_gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Fields:
-        e, time_us = estimate, boot_ms * 1000
-        has_fix = self._is_over("fix", boot_ms)
+    def tell_gps_raw_int(self) -> Fields:
+        e, time_us = self._estimate, self._boot_ms * 1000
+        has_fix = self._is_over("fix")
         if self._on.outbox.faults.gps_lost or not has_fix:
             return time_us, 0, 0, 0, 0, UNKNOWN_U16, UNKNOWN_U16, 0, 0, 0
         place, course = self._on.origin.to_global(e.north, e.east), math.atan2(e.ve, e.vn)
@@ -132,51 +135,51 @@ class Telemetry:
     def _altitude(self, estimate: Estimate) -> int:
         return round((self._on.origin.altitude - estimate.down) * 1e3)
 
-    def tell_vfr_hud(self, estimate: Estimate, _boot_ms: int) -> Fields:
-        speed = estimate.ground_speed
-        throttle = min(100, round(abs(estimate.forward_speed) * 20)) if self._flight.armed else 0
-        heading = _centidegrees(estimate.yaw) // 100
-        altitude = self._on.origin.altitude - estimate.down
-        return speed, speed, heading, throttle, altitude, 0.0
+    def tell_vfr_hud(self) -> Fields:
+        e, speed = self._estimate, self._estimate.ground_speed
+        throttle = min(100, round(abs(e.forward_speed) * 20)) if self._flight.armed else 0
+        heading = _centidegrees(e.yaw) // 100
+        return speed, speed, heading, throttle, self._on.origin.altitude - e.down, 0.0
 
-    def tell_home_position(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
-        if not self._is_over("position", boot_ms):
+    def tell_home_position(self) -> Fields | None:
+        if not self._is_over("position"):
             return None
         north, east = self._flight.home
         place = self._on.origin.to_global(north, east)
         altitude, local = round(self._on.origin.altitude * 1e3), (north, east, 0.0)
-        if not self._is_over("origin", boot_ms):  # recorded
+        if not self._is_over("origin"):  # recorded
             altitude, local = NO_ALTITUDE, (math.nan,) * 3
-        return *place, altitude, *local, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000
+        return *place, altitude, *local, LEVEL, 0.0, 0.0, 0.0, self._boot_ms * 1000
 
-    def tell_gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_gps_global_origin(self) -> Fields | None:
         on = self._on
-        if not (on.realism.tells_origin and self._is_over("origin", boot_ms)):
+        if not (on.realism.tells_origin and self._is_over("origin")):
             return None
         altitude = round(on.origin.altitude * 1e3)
-        return *on.origin.in_degrees_e7, altitude, boot_ms * 1000
+        return *on.origin.in_degrees_e7, altitude, self._boot_ms * 1000
 
-    def tell_rc_channels(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_rc_channels(self) -> Fields | None:
         sticks = self._on.sticks
         if not sticks.is_there:
             return None
-        values = (*sticks.channels(self._time(boot_ms)), *(0,) * 10, RSSI_UNKNOWN)
-        return boot_ms, 8, *values
+        values = (*sticks.channels(self._time), *(0,) * 10, RSSI_UNKNOWN)
+        return self._boot_ms, 8, *values
 
-    def _is_over(self, time: str, boot_ms: int) -> bool:
-        return self._on.boot.has_passed(time, self._time(boot_ms))
+    def _is_over(self, time: str) -> bool:
+        return self._on.boot.has_passed(time, self._time)
 
-    def _time(self, boot_ms: int) -> float:
-        """Return the time that the message says."""
-        return self._on.started + boot_ms * 1e-3
+    @property
+    def _time(self) -> float:
+        """The time that the message says."""
+        return self._on.started + self._boot_ms * 1e-3
 
-    def tell_battery_status(self, *_: object) -> Fields:
+    def tell_battery_status(self) -> Fields:
         return 0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100
 
-    def tell_protocol_version(self, *_: object) -> Fields:
+    def tell_protocol_version(self) -> Fields:
         return 200, 100, 200, NOTHING, NOTHING  # MAVLink 2, minimum 1
 
-    def tell_autopilot_version(self, *_: object) -> Fields:
+    def tell_autopilot_version(self) -> Fields:
         persona = self._on.persona
         return (
             persona.capabilities,
@@ -189,7 +192,7 @@ class Telemetry:
             self._on.uid,
         )
 
-    def tell_mission_current(self, *_: object) -> Fields:
+    def tell_mission_current(self) -> Fields:
         flight, missions = self._flight, self._on.missions
         total = missions.item_count
         if total == 0:
@@ -208,16 +211,16 @@ class Telemetry:
             *map(missions.plan_id, (MISSION, FENCE, RALLY)),
         )
 
-    def tell_position_target_global_int(self, _estimate: Estimate, boot_ms: int) -> Fields | None:
+    def tell_position_target_global_int(self) -> Fields | None:
         destination, origin = self._flight.destination, self._on.origin
         if destination is None:
             return None
         place = origin.to_global(*destination)
         if not is_on_earth(*place):
             return None  # a local place far beyond the Earth's coordinates
-        return boot_ms, 5, TARGET_POSITION_ONLY, *place, origin.altitude, *NOTHING
+        return self._boot_ms, 5, TARGET_POSITION_ONLY, *place, origin.altitude, *NOTHING
 
-    def tell_current_mode(self, *_: object) -> Fields:
+    def tell_current_mode(self) -> Fields:
         flight, persona = self._flight, self._on.persona
         offered, numbers = persona.offered_modes, persona.modes.numbers
         standard = next((each.standard for each in offered if each.mode is flight.mode), 0)

@@ -4,9 +4,10 @@ It never sends first: it talks to peers from which it has recently received vali
 everything to each of them, as the real one does on a link.
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from enum import Enum
 
+from mav_tasks.links.base import Link
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.signing import Key
@@ -164,3 +165,14 @@ class Vehicle:
 
 
 make_vehicle = Vehicle  # the name that tests and tools call it by
+
+
+def exchange(link: Link, vehicles: Sequence[Vehicle], now: float, most: int) -> None:
+    """Let vehicles on a link take ``most`` datagrams, run due control steps, and send."""
+    for peer, data in link.receive(most) if most else ():
+        for vehicle in vehicles:
+            vehicle.receive(data, peer, now=now)
+    for vehicle in vehicles:
+        vehicle.handle_deadline(now=now)
+        for peer, packet in vehicle.take_packets():
+            link.send(peer, packet)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from mav_tasks.links.memory import MemoryLink, MemoryNet
-from rover_sim.vehicle import Vehicle
+from rover_sim.vehicle import Vehicle, exchange
 
 
 class Party(Protocol):
@@ -93,9 +93,4 @@ class RoverParty:
 
     def turn(self, *, now: float) -> None:
         """Receive, run due control steps, and send."""
-        if self._link.arrived:
-            for peer, data in self._link.receive(len(self._link.arrived)):
-                self.vehicle.receive(data, peer, now=now)
-        self.vehicle.handle_deadline(now=now)
-        for peer, data in self.vehicle.take_packets():
-            self._link.send(peer, data)
+        exchange(self._link, (self.vehicle,), now, len(self._link.arrived))
