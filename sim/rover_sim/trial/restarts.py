@@ -7,7 +7,7 @@ from mav_tasks.basics.errors import NoAnswer, Refused
 from mav_tasks.client.handle import Task
 from mav_tasks.kinds import Move
 from mav_tasks.tasks.lifecycle import TaskState
-from rover_sim.trial.session import Result, Session, TrialError
+from rover_sim.trial.session import NotTried, Result, Session, TrialError
 
 DISTANCE = 5.0  # m
 DONE = 2.0  # m, after which it happens
@@ -21,13 +21,9 @@ TAKEN_WITHIN = 60.0  # s
 DRIVEN_WITHIN = 180.0  # s; below the server's watch.ready_timeout
 
 
-def lacks_reboot(session: Session) -> str:
-    """Return what is missing to restart the rover."""
-    return "" if session.ground.can_reboot else "no way to restart it (--reboot-command, --stick)"
-
-
 async def boot(session: Session) -> Result:
     """Restart the idle rover, and submit at once."""
+    _need_reboot(session)
     await session.rest()
     begun = session.now
     await session.ground.reboot()
@@ -47,35 +43,25 @@ async def boot(session: Session) -> Result:
     return Result(words, holds, figure, "all driven")
 
 
-async def restart(session: Session) -> Result:
-    """End the server in order, start another one on its store, release the remainder."""
+async def restart(session: Session, *, is_killed: bool) -> Result:
+    """End the server in order or kill it, start another one on its store, release the remainder."""
 
     async def happens() -> str:
+        server = session.ground.server
         await session.disconnect()
-        await session.ground.server.end()
+        await (server.kill() if is_killed else server.end())
         # its own estimate comes by way of the server, which has ended
-        stood = session.ground.truth is None or session.track.stands(window=0.3)
+        is_known = session.ground.truth is not None and not is_killed
+        moved = is_known and not session.track.stands(window=0.3)
         await session.begin()
-        return "" if stood else "still moved when the server was gone; "
-
-    return await _interrupted(session, happens, is_exact=True)
-
-
-async def kill(session: Session) -> Result:
-    """Kill the server, start another one on its store, release the remainder."""
-
-    async def happens() -> str:
-        await session.disconnect()
-        await session.ground.server.kill()
-        await asyncio.sleep(1.0)
-        await session.begin()
-        return ""
+        return "still moved when the server was gone; " if moved else ""
 
     return await _interrupted(session, happens, is_exact=True)
 
 
 async def reboot(session: Session) -> Result:
     """Restart the rover, and finish the task after its release."""
+    _need_reboot(session)
 
     async def happens() -> str:
         await session.ground.reboot()
@@ -84,6 +70,11 @@ async def reboot(session: Session) -> Result:
         return ""
 
     return await _interrupted(session, happens, is_exact=False)
+
+
+def _need_reboot(session: Session) -> None:
+    if not session.ground.can_reboot:
+        raise NotTried("no way to restart it (--reboot-command, --stick)")
 
 
 async def _interrupted(

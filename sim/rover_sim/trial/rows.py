@@ -8,7 +8,7 @@ from functools import partial
 
 from mav_tasks.basics.errors import ClientError
 from rover_sim.trial import restarts, stopping, tasks
-from rover_sim.trial.session import Result, Session, TrialError
+from rover_sim.trial.session import NotTried, Result, Session, TrialError
 
 AHEAD = "10 m ahead"
 
@@ -29,8 +29,6 @@ class Kind:
     tried: str
     room: str
     run: Callable[[Session], Awaitable[Result]]
-    #: what is missing for it here, in words; "": nothing
-    lacks: Callable[[Session], str] = lambda _: ""
 
     @property
     def title(self) -> str:
@@ -50,29 +48,21 @@ class Row:
 
 
 KINDS = (
+    Kind("boot", "3 tasks in the first 5 s of its boot", AHEAD, restarts.boot),
+    Kind("stop", "STOP at 1 m/s", "40 m ahead, or 20 m with --stop-distance", stopping.stop),
     Kind(
-        "boot",
-        "3 tasks in the first 5 s of its boot",
+        "restart",
+        "orderly restart of the server (SIGTERM) in mid-move",
         AHEAD,
-        restarts.boot,
-        restarts.lacks_reboot,
+        partial(restarts.restart, is_killed=False),
     ),
     Kind(
-        "stop",
-        "STOP at 1 m/s",
-        "40 m ahead, or 20 m with --stop-distance",
-        stopping.stop,
-        stopping.lacks_distance,
-    ),
-    Kind("restart", "orderly restart of the server (SIGTERM) in mid-move", AHEAD, restarts.restart),
-    Kind("kill", "SIGKILL of the server in mid-move", AHEAD, restarts.kill),
-    Kind(
-        "reboot",
-        "restart of the rover in mid-task",
+        "kill",
+        "SIGKILL of the server in mid-move",
         AHEAD,
-        restarts.reboot,
-        restarts.lacks_reboot,
+        partial(restarts.restart, is_killed=True),
     ),
+    Kind("reboot", "restart of the rover in mid-task", AHEAD, restarts.reboot),
     Kind(
         "tasks",
         "30 tasks",
@@ -82,12 +72,11 @@ KINDS = (
     *(
         Kind(
             "stick",
-            f"throttle stick pushed forward, {moment.value}",
+            f"throttle stick pushed forward, {when}",
             AHEAD,
-            partial(stopping.stick, moment),
-            stopping.lacks_stick,
+            partial(stopping.stick, when=when),
         )
-        for moment in stopping.Moment
+        for when in ("starting", "driving", "cancelled")
     ),
 )
 #: names and the room that each needs
@@ -108,12 +97,12 @@ async def run_rows(
 
 
 async def _run(session: Session, kind: Kind) -> Row:
-    if why := kind.lacks(session):
-        return Row(kind, Verdict.NOT_TRIED, Result(why, holds=False))
     session.say(f"{kind.name}: {kind.tried}")
     begun = session.now
     try:
         result = await kind.run(session)
+    except NotTried as error:
+        return Row(kind, Verdict.NOT_TRIED, Result(str(error), holds=False))
     except (ClientError, TrialError) as error:
         result = Result(str(error), holds=False)
     if not result.holds:

@@ -40,6 +40,10 @@ class TrialError(Exception):
     """A row cannot continue; the message has the reason."""
 
 
+class NotTried(Exception):
+    """A row lacks something here; the message says what."""
+
+
 class Result(NamedTuple):
     """What came of a row: words, whether they hold the limit, a figure, the limit."""
 

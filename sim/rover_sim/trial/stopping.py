@@ -1,7 +1,6 @@
 """Rows: STOP at 1 m/s beside the rover's own ways to stop, and the throttle stick of a person."""
 
 import asyncio
-from enum import Enum
 from statistics import median
 
 from pymavlink.dialects.v20 import development as mav
@@ -10,7 +9,7 @@ from mav_tasks.basics.errors import Refused
 from mav_tasks.kinds import Drive, Move
 from rover_sim.observing.driver import Driver, Interference
 from rover_sim.observing.observer import Observer
-from rover_sim.trial.session import Result, Session, TrialError, quietly
+from rover_sim.trial.session import NotTried, Result, Session, TrialError, quietly
 
 SPEED = 1.0  # m/s
 RUN_UP = 5.0  # s; the slowest recorded rover needs 4 s
@@ -68,15 +67,10 @@ async def _stop_by(way: str, driver: Driver, session: Session) -> float | None:
     return track.travelled(begun)  # on zeros a PX4 car drives a loop
 
 
-def lacks_distance(session: Session) -> str:
-    """Return what is missing to judge a stop."""
-    known = session.best is not None
-    return "" if known else "the shortest stopping distance is not known (--stop-distance)"
-
-
 async def stop(session: Session) -> Result:
     """Drive at 1 m/s and send STOP."""
-    assert session.best is not None
+    if session.best is None:
+        raise NotTried("the shortest stopping distance is not known (--stop-distance)")
     metres: list[float] = []
     words = ""
     for _ in range(RUNS):
@@ -99,33 +93,22 @@ async def stop(session: Session) -> Result:
     return Result(words or f"stopped {len(metres)} times", holds, figure, f"{allowed:g} x")
 
 
-class Moment(Enum):
-    """The moment at which the stick is pushed."""
-
-    STARTING = "starting"
-    DRIVING = "driving"
-    CANCELLED = "cancelled"
-
-
-def lacks_stick(session: Session) -> str:
-    """Return what is missing to push the stick."""
+async def stick(session: Session, *, when: str) -> Result:
+    """Push the throttle stick as a person would, when a task is starting, driving or cancelled."""
     if session.rover is not None and session.rover.kind == "px4":
-        return "PX4 does not add the stick"
-    return "" if session.ground.can_push_stick else "no second link (--stick)"
-
-
-async def stick(moment: Moment, session: Session) -> Result:
-    """Push the throttle stick at this moment, as a person would."""
+        raise NotTried("PX4 does not add the stick")
+    if not session.ground.can_push_stick:
+        raise NotTried("no second link (--stick)")
     await session.rest()
     pushed = session.now
     try:
-        if moment is Moment.STARTING:
+        if when == "starting":
             session.ground.push_stick(FORWARD)
             await quietly(lambda: session.submit(Move(LONG)))
         else:
             task = await session.submit(Move(LONG))
             await session.running_since(task, 1.0)
-            if moment is Moment.CANCELLED:
+            if when == "cancelled":
                 await task.cancel()
                 await asyncio.sleep(0.1)
             pushed = session.now
