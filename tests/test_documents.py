@@ -69,7 +69,7 @@ COMMANDS = {
     "mav-tasks submit move 3 --vehicle any": "tests/e2e/test_cli_fleet.py",
     "mav-tasks modify 12 --every never": "tests/e2e/test_schedules.py",
     "mav-tasks cancel --series 12": "tests/e2e/test_schedules.py",
-    "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
+    "python -m rover_sim.check_vehicle": "tests/sim/test_check_vehicle.py",
 }
 
 BROKEN_AT = "### When something breaks"

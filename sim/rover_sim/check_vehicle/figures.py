@@ -230,3 +230,10 @@ def _value(text: str) -> Value:
         return float(text)
     except ValueError:
         return None if text == NOTHING else text
+
+
+def shown(value: Value) -> str:
+    """Return a value as real.csv has it."""
+    if value is None:
+        return NOTHING
+    return value if isinstance(value, str) else f"{value:.3f}"

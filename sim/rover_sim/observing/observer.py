@@ -75,7 +75,6 @@ class Observer:
         self.last: dict[str, Heard] = {}
         self.log: list[Heard] = []
         self.answers: list[Answer] = []
-        self.damaged = 0  # packets that pymavlink refuses
         #: called with each message of the autopilot's system
         self.listeners: list[Callable[[Heard], None]] = []
         self._keeps = keeps
@@ -102,32 +101,15 @@ class Observer:
         """Return the seconds since the last message of this name."""
         return self.now - self.last[name].at if name in self.last else inf
 
-    def since(self, mark: int, name: str) -> list[Heard]:
-        """Return the messages of this name from a length of the log on."""
-        return [heard for heard in self.log[mark:] if heard.name == name]
-
     # asking
 
-    def send(self, message: Any) -> None:
-        """Send a message that ``out`` has encoded."""
-        self.out.send(message)
-
-    async def command(
-        self, number: int, *params: float, system: int | None = None, component: int = AUTOPILOT
-    ) -> Answer:
+    async def command(self, number: int, *params: float, component: int = AUTOPILOT) -> Answer:
         """Send a COMMAND_LONG, by default to the autopilot, and return its answer."""
-        filled = (*params, *(0.0,) * (7 - len(params)))
-        target = (self.system if system is None else system, component)
-        return await self.ask(self.out.command_long_encode(*target, number, 0, *filled), filled)
-
-    async def ask(self, message: Any, params: tuple[float, ...] = ()) -> Answer:
-        """Send a COMMAND_LONG or COMMAND_INT and return the answer."""
-        began = self.now
-        self.send(message)
-        ack = await self.wait("COMMAND_ACK", PATIENCE, lambda ack: ack.command == message.command)
+        filled, began = (*params, *(0.0,) * (7 - len(params))), self.now
+        self.out.command_long_send(self.system, component, number, 0, *filled)
+        ack = await self.wait("COMMAND_ACK", PATIENCE, lambda ack: ack.command == number)
         seen = (None, 0) if ack is None else (int(ack.result), int(ack.result_param2))
-        took = self.now - began
-        self.answers.append(Answer(message.command, params, began, seen[0], took, seen[1]))
+        self.answers.append(Answer(number, filled, began, seen[0], self.now - began, seen[1]))
         return self.answers[-1]
 
     async def wait(
@@ -179,7 +161,6 @@ class Observer:
             try:
                 message = self.out.decode(bytearray(packet.raw))
             except mav.MAVError:
-                self.damaged += 1
                 return
             name = str(message.get_type())
         self._take(Heard(now, name, message, packet))
