@@ -1,18 +1,11 @@
-"""A net that tests can degrade per leg, and that records the texts to clients."""
+"""A net that tests can degrade per leg."""
 
-from collections import deque
 from contextlib import ExitStack
-from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
-from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
-from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.links.memory import Conditions, MemoryNet
 from mav_tasks.shell.in_memory import CLIENT_LINK, VEHICLE_LINK
-
-STATUSTEXT = 253
-MESSAGE_ID = slice(7, 10)  # in a MAVLink 2 packet
-TEXTS_KEPT = 200
 
 #: which legs to degrade: clients to server, server to rovers, or both
 Leg = Literal["client", "rover", "both"]
@@ -23,45 +16,16 @@ LEGS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
-    """A STATUSTEXT that reached a client; longer ones than 50 bytes come in pieces."""
-
-    at: float  # virtual s
-    system_id: int
-    component_id: int
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.at:9.2f} s  {self.system_id}/{self.component_id}  {self.text}"
-
-
 class LossyNet(MemoryNet):
     """A net that is good at first; ``ways`` degrades the links of one end of the server."""
 
     def __init__(self, *, seed: int) -> None:
         super().__init__(seed=seed)
         self.ways: dict[str, Conditions] = {}
-        self.texts: deque[Text] = deque(maxlen=TEXTS_KEPT)
 
     def conditions_between(self, source: str, target: str) -> Conditions:
         """Return the conditions between two ends, one of which is the server's."""
         return self.ways.get(source) or self.ways.get(target) or self.conditions
-
-    def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
-        """Record the texts that the server sends to a client."""
-        if source == CLIENT_LINK and data[MESSAGE_ID] == STATUSTEXT.to_bytes(3, "little"):
-            self.texts += (
-                Text(
-                    self.now,
-                    packet.system_id,
-                    packet.component_id,
-                    packet.payload[1:51].rstrip(b"\0").decode(errors="replace"),
-                )
-                for packet in split_datagram(data)
-                if packet.message_id == STATUSTEXT
-            )
-        super().arrive(link, source, data)
 
 
 class LossyLink:

@@ -20,7 +20,7 @@ from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.errors import NotInVirtualTime, Stalled
 from rover_sim.kinematic_bodies import kinematic_body
-from rover_sim.testing.lossy import LossyLink, LossyNet, Text
+from rover_sim.testing.lossy import LossyLink, LossyNet
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.simulated_rover import SimulatedRover
 from rover_sim.testing.task_server import TaskServer
@@ -70,11 +70,6 @@ class RoverWorld:
     def utc(self) -> datetime:
         """Time of day in this world; it starts at the real time, rounded to a second."""
         return datetime.fromtimestamp(self._began + self.now, UTC)
-
-    @property
-    def texts(self) -> list[Text]:
-        """The last STATUSTEXTs that reached a client."""
-        return list(self._net.texts)
 
     def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
         """Run a coroutine to its end in virtual time. Raise Stalled or NotInVirtualTime.

@@ -47,13 +47,8 @@ def test_the_example_is_able_to_fail(pytester: pytest.Pytester) -> None:
             "*- simulated rover -*",
             "ardupilot, kinematic body, * s of virtual time",
             "rover 1 at [12].* m north, * m east, heading * deg, * m/s, armed, hold",
-            "tasks:",
-            "     1 of rover 1: move 2 m: completed",
-            "journal:",
             "*rover 1: task 1 submitted: move 2 m, priority 5, by *",
             "*task 1 completed; * setpoints at 20 Hz: p50 50.0, p99 50.0, max 50.0 ms, 0 late",
-            "texts:",
-            "* s  1/191  Task 1 done",
         ]
     )
 
@@ -243,8 +238,7 @@ def test_a_test_that_waits_for_ever_ends_and_says_for_what(pytester: pytest.Pyte
             ">       rover_world.run(patrol(rover_world.client()))",
             "E * not over within 30 s of virtual time; at *",
             "E *test_patrol.py:9 patrol: await task.done()",
-            "tasks:",
-            "     1 of rover 1: move 1 m: queued",
+            "* rover 1: task 1 submitted: move 1 m*",
         ]
     )
     result.stdout.no_fnmatch_line("*_run_once*")
