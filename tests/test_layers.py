@@ -32,7 +32,7 @@ rover_sim: basics config links mavlink
 rover_sim.testing: client shell kinds links mavlink rover_sim config store tasks
 rover_sim.observing: client links mavlink rover_sim rover_sim.testing
 rover_sim.check_vehicle: links rover_sim rover_sim.testing rover_sim.observing
-rover_sim.trial: basics client kinds links tasks rover_sim.observing
+rover_sim.trial: basics client kinds links tasks rover_sim.testing rover_sim.observing
 rover_sim.demo: client basics mavlink shell kinds links recording rover_sim rover_sim.testing \
 config tasks rover_sim.observing
 cli: basics mavlink links config plans kinds tasks store recording shell client web agents probe \

@@ -115,10 +115,16 @@ def _rest(it: Moment) -> int | None:
     return _at(still & (moved[ends] == moved))
 
 
-def _when(index: Callable[[Moment], int | None], of: str, it: Moment) -> Value:
-    """Return the time or the way of a place, None if there is none."""
-    found = index(it)
+def _rest_of(of: str, it: Moment) -> Value:
+    """Return the time or the way when it rests, None if it does not."""
+    found = _rest(it)
     return None if found is None else float(getattr(it, of)[found])
+
+
+def _after(fits: Callable[[Moment], ArrayLike], it: Moment) -> Value:
+    """Return the seconds until the first true place that fits, None if there is none."""
+    found = _at(fits(it))
+    return None if found is None else float(it.time[found])
 
 
 def _late(of: str, it: Moment) -> float:
@@ -129,14 +135,6 @@ def _late(of: str, it: Moment) -> float:
 
 def _turned(it: Moment) -> float:
     return float(np.degrees(it.yaw[-1] - it.yaw[0]))
-
-
-def _slower(it: Moment) -> int | None:
-    return _at(it.speed < 0.9 * it.speed[0])
-
-
-def _risen(it: Moment) -> int | None:
-    return _at(it.along / ASKED[it.mark] >= RISEN)
 
 
 #: how each figure is measured, by its name in real.csv
@@ -172,10 +170,12 @@ FIGURES: Mapping[str, Callable[[Moment], Value]] = {
     "turned": _turned,
     "turned either way": lambda it: abs(_turned(it)),
     "way": lambda it: float(it.way[-1]),
-    "stands after": partial(_when, _rest, "time"),
-    "stands within": partial(_when, _rest, "way"),
-    "slower by a tenth after": partial(_when, _slower, "time"),
-    "reaches 63 % of what was asked": partial(_when, _risen, "time"),
+    "stands after": partial(_rest_of, "time"),
+    "stands within": partial(_rest_of, "way"),
+    "slower by a tenth after": partial(_after, lambda it: it.speed < 0.9 * it.speed[0]),
+    "reaches 63 % of what was asked": partial(
+        _after, lambda it: it.along / ASKED[it.mark] >= RISEN
+    ),
     "modes": lambda it: _joined(_modes(it), ", "),
     "texts": lambda it: _joined([re.sub(r"\d+", "#", text) for text in _texts(it)]),
 }

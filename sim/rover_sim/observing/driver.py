@@ -52,7 +52,6 @@ class Driver:
         """``farthest``: m from the first driven place. ``keeps_course``: also where zeros turn."""
         self.observer = observer
         self.told = Track()
-        self.last_setpoint_at = 0.0
         self._farthest = farthest
         self._keeps_course = keeps_course
         self._start: Place | None = None
@@ -149,54 +148,43 @@ class Driver:
         await self.stream(PRESS_ON if self._keeps_course and self.make.is_px4 else 0.0, seconds)
 
     async def stream(
-        self,
-        speed: float,
-        seconds: float,
-        *,
-        yaw_rate: float = 0.0,
-        aside: float = 0.0,
-        frame: int | None = None,
+        self, speed: float, seconds: float, *, yaw_rate: float = 0.0, aside: float = 0.0
     ) -> None:
         """Stream a velocity: m/s ahead, rad/s clockwise, ``aside`` rad from the heading.
 
-        ``frame``: another MAV_FRAME than the one that the make follows. Raise Interference.
+        Raise Interference.
         """
         begin, course = self.observer.now, self.place.yaw + aside if len(self.told) else aside
-        by_course = self.make.is_px4 if frame is None else frame == mav.MAV_FRAME_LOCAL_NED
         for step in range(max(1, round(seconds / PERIOD))):
             if abs(speed) > PRESS_ON or yaw_rate:
                 self._guard()
-            turned = course + yaw_rate * step * PERIOD
-            if by_course:
-                self._send(
-                    mav.MAV_FRAME_LOCAL_NED, VELOCITY, speed * cos(turned), speed * sin(turned)
-                )
+            if self.make.is_px4:
+                turned = course + yaw_rate * step * PERIOD
+                velocity = speed * cos(turned), speed * sin(turned)
+                self._send(mav.MAV_FRAME_LOCAL_NED, VELOCITY, *velocity, 0.0)
             else:
-                mask = VELOCITY if frame is not None and not yaw_rate else VELOCITY_AND_RATE
-                self._send(mav.MAV_FRAME_BODY_NED, mask, speed, 0.0, yaw_rate)
+                self._send(mav.MAV_FRAME_BODY_NED, VELOCITY_AND_RATE, speed, 0.0, yaw_rate)
             await asyncio.sleep(max(0.0, begin + (step + 1) * PERIOD - self.observer.now))
 
-    def _send(self, frame: int, mask: int, vx: float, vy: float, yaw_rate: float = 0.0) -> None:
+    def _send(self, frame: int, mask: int, vx: float, vy: float, yaw_rate: float) -> None:
         if not isfinite(vx + vy + yaw_rate):
             raise Interference("its heading is not a number")
-        self.last_setpoint_at = self.observer.now
         self.observer.out.set_position_target_local_ned_send(
             *(0, self.observer.system, AUTOPILOT, frame, mask),
             *(0.0, 0.0, 0.0, vx, vy, 0.0, 0.0, 0.0, 0.0, 0.0, yaw_rate),
         )
 
     def _guard(self) -> None:
-        if self.observer.silence("HEARTBEAT") > FRESH_BEAT:
-            raise Interference(f"no heartbeat for {FRESH_BEAT:g} s")
-        if self.observer.silence("LOCAL_POSITION_NED") > FRESH_PLACE:
-            raise Interference(f"no LOCAL_POSITION_NED for {FRESH_PLACE:g} s")
-        if not self.is_armed:
-            raise Interference("it is not armed any more")
-        if self.mode != self.make.control:
-            raise Interference(f"it left the mode that follows setpoints, for {self.mode:#x}")
         self._start = self._start or self.place
-        if self.place.apart(self._start) > self._farthest:
-            raise Interference(f"it is {self._farthest:g} m away")
+        for is_wrong, words in (
+            (self.observer.silence("HEARTBEAT") > FRESH_BEAT, "no heartbeat"),
+            (self.observer.silence("LOCAL_POSITION_NED") > FRESH_PLACE, "no LOCAL_POSITION_NED"),
+            (not self.is_armed, "it is not armed any more"),
+            (self.mode != self.make.control, f"it left the mode of setpoints for {self.mode:#x}"),
+            (self.place.apart(self._start) > self._farthest, f"it is {self._farthest:g} m away"),
+        ):
+            if is_wrong:
+                raise Interference(words)
 
     def _note_place(self, heard: Heard) -> None:
         attitude = self.observer.message("ATTITUDE")

@@ -17,6 +17,7 @@ from mav_tasks.links.base import Link
 from mav_tasks.mavlink.packet import Packet
 
 AUTOPILOT = 1  # component
+STATION = (255, 190)
 NO_VEHICLES = frozenset({6, 18, 26, 27})  # MAV_TYPE: ground station, computer, gimbal, ADS-B
 BEAT = 1.0  # s between heartbeats
 PATIENCE = 1.0  # s for the answer to a command
@@ -66,11 +67,9 @@ class Answer(NamedTuple):
 class Observer:
     """Implements ``Talk`` of the link driver, for the first autopilot that it hears."""
 
-    def __init__(
-        self, link: Link, *, source: tuple[int, int] = (255, 190), keeps: bool = False
-    ) -> None:
+    def __init__(self, link: Link, *, keeps: bool = False) -> None:
         """``keeps``: remember every message in ``log``, not only the last of each kind."""
-        self.out: Any = mav.MAVLink(self, *source)
+        self.out: Any = mav.MAVLink(self, *STATION)
         self.system = 0  # of the first autopilot that was heard
         self.last: dict[str, Heard] = {}
         self.log: list[Heard] = []

@@ -1,7 +1,6 @@
 """Runs the trial on a real rover, or on one that a simulator runs as a process."""
 
 import asyncio
-import socket
 import tempfile
 from collections.abc import Callable, Collection
 from contextlib import AsyncExitStack
@@ -19,6 +18,7 @@ from rover_sim.observing.driver import Driver
 from rover_sim.observing.observer import Observer
 from rover_sim.observing.track import Track
 from rover_sim.observing.truth import from_file, from_link
+from rover_sim.testing.processes import free_ports
 from rover_sim.trial.report import Report
 from rover_sim.trial.rows import Row, run_rows
 from rover_sim.trial.server import ServerProcess
@@ -58,7 +58,7 @@ async def run_trial(options: Options, report: Report, *, say: Callable[[str], No
         truth, second = _truth(options, stack)
         report.rover = await _identify(options.url)
         say(f"rover: {report.rover}")
-        port = _free_port()
+        (port,) = free_ports(1)
         server = ServerProcess(
             folder,
             *("--client", f"udpin:127.0.0.1:{port}", "--no-push", "--vehicle", options.url),
@@ -133,9 +133,3 @@ async def _identify(url: str) -> str:
         return f"{name}, firmware {shown}" if number else f"{name}, firmware not reported"
     finally:
         observer.close()
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
