@@ -47,9 +47,8 @@ async def trial(
         str,
         typer.Option(
             metavar="FILE|URL",
-            help="True poses: a file of lines t,north,east,yaw or of JSON objects, that of "
-            "sim --truth, or a link with SIM_STATE or HIL_STATE_QUATERNION; default: the poses "
-            "that the rover reports.",
+            help="True poses: a file of lines t,north,east,yaw, that of sim --truth, or a link "
+            "with SIM_STATE or HIL_STATE_QUATERNION; default: the poses that the rover reports.",
         ),
     ] = "",
     stick: Annotated[

@@ -23,21 +23,20 @@ from mav_tasks.links.base import Link
 from mav_tasks.links.link_limits import TO_CLIENTS
 from mav_tasks.links.udp import UdpUrl
 from mav_tasks.mavlink.signing import Key
-from rover_sim.body import Body, Pose, wrap_angle
-from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet
+from rover_sim.body import Pose, wrap_angle
+from rover_sim.bullet import NO_PYBULLET, has_pybullet
 from rover_sim.errors import MissingExtra, SimulatedCrash
-from rover_sim.fault_plan import HELP, PlanError, PlannedFault, check_rovers, read_fault
+from rover_sim.fault_plan import HELP, PlanError, PlannedFault, read_fault
 from rover_sim.fault_player import FaultPlayer
 from rover_sim.frames import Frame
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
-from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.kinematic_bodies import make_body
 from rover_sim.personas import PERSONAS, Persona
 from rover_sim.real_time import Clock, drive
 from rover_sim.realism import NO_BOOT, SHORT, Gps
 from rover_sim.vehicle import Peers, make_vehicle
 
 SPACING = 3.0  # m between rovers, side by side
-KINEMATIC_SLIP = 0.3  # as for the pybullet rover
 TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
 HOME_FIELDS = 4
 PULSES = (800, 2200)  # µs, the range of a receiver
@@ -226,23 +225,6 @@ def sim(
     answers = peers or (Peers.FIRST if make.answers_first_peer else Peers.ALL)
     faults = _plan(fault or [], make, numbers)
 
-    def body_of(index: int) -> Body:
-        start = Pose(east=SPACING * index, yaw=place.yaw)
-        own_seed = None if seed is None else seed + index
-        if body == "kinematic":
-            return kinematic_body(make.frame, start=start, slip=KINEMATIC_SLIP, seed=own_seed)
-        try:
-            return BulletBody(
-                start=start,
-                frame=make.frame,
-                friction=friction,
-                variation=friction_variation,
-                seed=own_seed,
-                gui=gui and index == 0,
-            )
-        except MissingExtra as error:
-            raise MissingExtra(f"{error}; or run with --body kinematic") from error
-
     try:
         with ExitStack() as stack:
             if body == "auto":
@@ -251,7 +233,18 @@ def sim(
                     sys.stderr.write(f"rover_sim: {NO_PYBULLET}\n")
             key = _key(sign, keys) if sign else None
             stop = _stop_signals(stack)
-            bodies = [body_of(index) for index in range(count)]
+            bodies = [
+                make_body(
+                    body,
+                    make.frame,
+                    start=Pose(east=SPACING * index, yaw=place.yaw),
+                    seed=None if seed is None else seed + index,
+                    friction=friction,
+                    variation=friction_variation,
+                    gui=gui and index == 0,
+                )
+                for index in range(count)
+            ]
             for each in bodies:
                 stack.callback(each.close)
             link = _open_link(host, port, is_allowed=insecure or key is not None)
@@ -297,11 +290,9 @@ def _refuse(option: str, why: str) -> NoReturn:
 
 def _plan(texts: list[str], make: Persona, numbers: range) -> list[PlannedFault]:
     try:
-        faults = [read_fault(text, make.frame) for text in texts]
-        check_rovers(faults, numbers)
+        return [read_fault(text, make.frame, numbers) for text in texts]
     except PlanError as error:
         _refuse("--fault", str(error))
-    return faults
 
 
 def _key(name: str, ring_file: str) -> Key:

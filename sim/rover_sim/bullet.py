@@ -15,6 +15,7 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -179,12 +180,8 @@ def _wheel_frictions(friction: float, variation: float, seed: int | None) -> lis
 
 
 def has_pybullet() -> bool:
-    """Return whether pybullet can be imported."""
-    try:
-        _pybullet()
-    except MissingExtra:
-        return False
-    return True
+    """Return whether pybullet is installed."""
+    return find_spec("pybullet") is not None
 
 
 def _pybullet() -> Any:
@@ -193,7 +190,9 @@ def _pybullet() -> Any:
         with _silent_stderr():
             import pybullet  # noqa: PLC0415
     except ImportError as error:
-        raise MissingExtra(f"the pybullet rover needs pybullet: {REMEDY}") from error
+        raise MissingExtra(
+            f"the pybullet rover needs pybullet, or use the kinematic one: {REMEDY}"
+        ) from error
     return pybullet
 
 

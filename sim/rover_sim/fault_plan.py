@@ -6,7 +6,7 @@
 """
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from math import inf, radians
 
@@ -88,8 +88,8 @@ HELP = (
 )
 
 
-def read_fault(text: str, frame: Frame) -> PlannedFault:
-    """Parse one fault. Raise PlanError."""
+def read_fault(text: str, frame: Frame, rovers: Container[int]) -> PlannedFault:
+    """Parse one fault of rovers with these numbers. Raise PlanError."""
     form = FORM.fullmatch(text.strip())
     if form is None:
         raise PlanError(f"not understood: {text!r}; for example: {EXAMPLE}")
@@ -108,11 +108,6 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
     if form["lasts"] is not None and not isinstance(event, Faults):
         raise PlanError(f"{text!r}: {name} is over at once, leave out 'for'")
     rover = None if form["rover"] is None else int(form["rover"])
+    if rover is not None and rover not in rovers:
+        raise PlanError(f"{text!r}: there is no rover {rover}")
     return PlannedFault(text.strip(), rover, float(form["at"]), event, lasts)
-
-
-def check_rovers(plan: Iterable[PlannedFault], numbers: Container[int]) -> None:
-    """Raise PlanError if a fault names a rover that does not exist."""
-    for fault in plan:
-        if fault.rover is not None and fault.rover not in numbers:
-            raise PlanError(f"{fault.text!r}: there is no rover {fault.rover}")

@@ -5,16 +5,16 @@ import typer
 from mav_tasks.config.settings import Recording, Settings
 from mav_tasks.recording import observers
 from mav_tasks.shell.in_memory import CLIENT_LINK, InMemoryServer
-from rover_sim.body import Body, Pose
-from rover_sim.bullet import BulletBody
+from rover_sim.body import Pose
 from rover_sim.demo.third_party import ThirdParty
-from rover_sim.kinematic import KinematicBody
+from rover_sim.frames import Frame
+from rover_sim.kinematic_bodies import make_body
 from rover_sim.observing.observer import Observer
 from rover_sim.observing.track import Track
 from rover_sim.observing.virtual import ROVER, VirtualGround
 from rover_sim.vehicle import make_vehicle
 
-SLIP = 0.3
+VARIATION = 0.3  # of the friction
 
 
 def drive(*, body: str, seed: int, record: str) -> tuple[ThirdParty, Track]:
@@ -24,11 +24,8 @@ def drive(*, body: str, seed: int, record: str) -> tuple[ThirdParty, Track]:
     """
     settings = Settings()
     recorders = observers(Recording(decisions=record), settings, None, now=0.0)
-    physics: Body = (
-        KinematicBody(start=Pose(), slip=SLIP, seed=seed or None)
-        if body == "kinematic"
-        else BulletBody(start=Pose(), variation=SLIP if seed else 0.0, seed=seed)
-    )
+    variation = VARIATION if seed else 0.0
+    physics = make_body(body, Frame.SKID, start=Pose(), seed=seed or None, variation=variation)
     ground = VirtualGround(make_vehicle(physics, system_id=1, now=0.0, seed=seed))
     net, track = ground.net, ground.truth
     server = InMemoryServer(net, vehicles=(ROVER,), settings=settings, observers=recorders)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from rover_sim.observing.track import Place
 
-MOST = 4000  # points of one track: more would not be seen
 SIDE = 4.0  # inches, of one panel
 
 
@@ -21,8 +20,7 @@ def draw(tracks: Mapping[str, Sequence[Place]], path: Path) -> None:
     figure = Figure(figsize=size, layout="constrained")
     for number, (name, places) in enumerate(tracks.items(), start=1):
         axes = figure.add_subplot(rows, columns, number, title=name)
-        shown = places[:: len(places) // MOST + 1]
-        axes.plot([p.east for p in shown], [p.north for p in shown])
+        axes.plot([p.east for p in places], [p.north for p in places])
         for label, place, marker in (("start", places[0], "o"), ("end", places[-1], "s")):
             axes.plot(place.east, place.north, marker, label=label)
         axes.set(xlabel="east, m", ylabel="north, m")

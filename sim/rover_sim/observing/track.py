@@ -2,7 +2,6 @@
 
 from bisect import bisect_left
 from dataclasses import dataclass
-from itertools import pairwise
 from math import hypot, inf, remainder, tau
 
 WINDOW = 0.5  # s; a displacement over this time gives a speed without the noise of one sample
@@ -87,11 +86,6 @@ class Track:
         seconds = max(self.last.time - first.time, 1e-6)
         turned = abs(remainder(self.last.yaw - first.yaw, tau))
         return self.last.apart(first) / seconds, turned / seconds
-
-
-def way(places: list[Place]) -> float:
-    """Return the metres driven from place to place."""
-    return sum(one.apart(other) for one, other in pairwise(places))
 
 
 def _time(place: Place) -> float:

@@ -17,9 +17,8 @@ from mav_tasks.config.settings import Settings
 from mav_tasks.links.memory import MemoryLink
 from mav_tasks.shell.in_memory import CLIENT_LINK
 from rover_sim.body import Body, Pose
-from rover_sim.bullet import BulletBody
 from rover_sim.errors import NotInVirtualTime, Stalled
-from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.kinematic_bodies import make_body
 from rover_sim.testing.lossy import LossyLink, LossyNet
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.simulated_rover import SimulatedRover
@@ -31,7 +30,6 @@ from rover_sim.virtual import RoverParty, VirtualWorld
 T = TypeVar("T")
 
 SPACING = 3.0  # m between rovers, side by side
-SLIP = 0.3  # of the kinematic body, before its seed varies it
 VARIATION = 0.3  # of the friction of bullet's ground
 LOOK = 0.02  # s of virtual time between two checks of a condition
 CLEAN_UP = 10.0  # virtual s for cancelled tasks to end
@@ -139,10 +137,11 @@ class RoverWorld:
         self._loop.run_until_complete(asyncio.wait({task}, timeout=CLEAN_UP))
 
     def _add_rover(self, number: int) -> SimulatedRover:
-        persona = self.options.make
-        body = self._make_body(number)
+        persona, seed = self.options.make, self.seed + number
+        start = Pose(east=SPACING * (number - 1))
+        kind = self.options.body
+        body = make_body(kind, persona.frame, start=start, seed=seed, variation=VARIATION)
         self._bodies.append(body)
-        seed = self.seed + number
         vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona, seed=seed)
         if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
             # Hold: by default a PX4 rover drives home when setpoints stop, and the server drives no
@@ -150,13 +149,6 @@ class RoverWorld:
             vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = 5
         self._world.join(RoverParty(vehicle, self._net.link(f"rover{number}")))
         return SimulatedRover(vehicle, persona=persona, clock=lambda: self.now)
-
-    def _make_body(self, number: int) -> Body:
-        start = Pose(east=SPACING * (number - 1))
-        seed, frame = self.seed + number, self.options.make.frame
-        if self.options.body == "kinematic":
-            return kinematic_body(frame, start=start, slip=SLIP, seed=seed)
-        return BulletBody(start=start, frame=frame, variation=VARIATION, seed=seed)
 
 
 def _is_in_a_loop() -> bool:
