@@ -232,7 +232,7 @@ def sim(
                 if body == "kinematic":
                     sys.stderr.write(f"rover_sim: {NO_PYBULLET}\n")
             key = _key(sign, keys) if sign else None
-            stop = _stop_signals(stack)
+            _end_on_signals(stack)
             bodies = [
                 make_body(
                     body,
@@ -275,10 +275,12 @@ def sim(
                     rover.autopilot.operator_pulses(*sticks)
                 sys.stdout.write(f"rover_sim: rover {number} ({what}) on udp {where}\n")
             sys.stdout.flush()
-            drive(link, stop, rovers, clock, poses, FaultPlayer(faults, rovers))
+            drive(link, rovers, clock, poses, FaultPlayer(faults, rovers))
     except (StartError, LinkOpenError, MissingExtra) as error:
         sys.stderr.write(f"rover_sim: {error}\n")
         raise typer.Exit(USAGE_ERROR) from None
+    except KeyboardInterrupt:
+        return
     except SimulatedCrash as error:
         sys.stderr.write(f"rover_sim: aborted, as the real one does: {error}\n")
         raise typer.Exit(ABORTED) from None
@@ -304,14 +306,17 @@ def _key(name: str, ring_file: str) -> Key:
         raise StartError(f"--sign {name}: {error}") from error
 
 
-def _stop_signals(stack: ExitStack) -> socket.socket:
-    """Return a socket that becomes readable on SIGINT and SIGTERM."""
-    stop, wake = map(stack.enter_context, socket.socketpair())
-    wake.setblocking(False)
-    stack.callback(signal.set_wakeup_fd, signal.set_wakeup_fd(wake.fileno()))
-    for number in (signal.SIGINT, signal.SIGTERM):
-        stack.callback(signal.signal, number, signal.signal(number, lambda *_: None))
-    return stop
+def _end_on_signals(stack: ExitStack) -> None:
+    """Let the first SIGINT or SIGTERM raise KeyboardInterrupt, and ignore more of them."""
+    signals = (signal.SIGINT, signal.SIGTERM)
+
+    def end(*_: object) -> None:
+        for number in signals:
+            signal.signal(number, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    for number in signals:
+        stack.callback(signal.signal, number, signal.signal(number, end))
 
 
 def _open_link(host: str, port: int, *, is_allowed: bool) -> Link:

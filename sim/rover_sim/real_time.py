@@ -1,10 +1,9 @@
 """Vehicles in real time on one UDP socket: the simulator's only clock and its only loop."""
 
-import selectors
-import socket
 import sys
 import time
-from typing import TextIO
+from select import select
+from typing import NoReturn, TextIO
 
 from mav_tasks.links.base import Link
 from rover_sim.fault_player import FaultPlayer
@@ -28,31 +27,24 @@ class Clock:
 
 def drive(
     link: Link,
-    stop: socket.socket,
     vehicles: list[Vehicle],
     clock: Clock,
     truth: TextIO | None,
     faults: FaultPlayer,
-) -> None:
-    """Run the vehicles on the link until ``stop`` is readable."""
-    selector = selectors.DefaultSelector()
-    selector.register(link, selectors.EVENT_READ)
-    selector.register(stop, selectors.EVENT_READ)
+) -> NoReturn:
+    """Run the vehicles on the link, until an exception ends it."""
     truth_due = clock.now()
-    with selector:
-        while True:
-            deadline = min(vehicle.next_deadline() for vehicle in vehicles)
-            ready = selector.select(max(0.0, (deadline - clock.now()) / clock.speed))
-            if any(key.fileobj is stop for key, _ in ready):
-                return
-            now = clock.now()
-            for line in faults.play(now - clock.start, now=now):
-                sys.stdout.write(f"rover_sim: {line}\n")
-                sys.stdout.flush()
-            exchange(link, vehicles, now, DATAGRAMS_PER_TURN if ready else 0)
-            if truth is not None and now >= truth_due:
-                _write_truth(truth, vehicles, now - clock.start)
-                truth_due = max(truth_due + TRUTH_INTERVAL, now)
+    while True:
+        deadline = min(vehicle.next_deadline() for vehicle in vehicles)
+        ready, _, _ = select([link], [], [], max(0.0, (deadline - clock.now()) / clock.speed))
+        now = clock.now()
+        for line in faults.play(now - clock.start, now=now):
+            sys.stdout.write(f"rover_sim: {line}\n")
+            sys.stdout.flush()
+        exchange(link, vehicles, now, DATAGRAMS_PER_TURN if ready else 0)
+        if truth is not None and now >= truth_due:
+            _write_truth(truth, vehicles, now - clock.start)
+            truth_due = max(truth_due + TRUTH_INTERVAL, now)
 
 
 def _write_truth(truth: TextIO, vehicles: list[Vehicle], elapsed: float) -> None:

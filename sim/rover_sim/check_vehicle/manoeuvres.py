@@ -9,16 +9,16 @@ import asyncio
 import csv
 from bisect import bisect_left
 from dataclasses import dataclass, field
-from functools import cached_property
 from math import radians
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import development as mav
 
-from rover_sim.observing.driver import Autopilot, Driver
-from rover_sim.observing.observer import Answer, Heard
+from rover_sim.observing.driver import Driver
+from rover_sim.observing.observer import Heard
 from rover_sim.observing.track import Place, Track
 
 #: s from a real rover's first message to its first HEARTBEAT, by which a driver detects it. The
@@ -32,23 +32,38 @@ FAST_IDS = (mav.MAVLINK_MSG_ID_ATTITUDE, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
 SLOW_IDS = (mav.MAVLINK_MSG_ID_SYS_STATUS, mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
 PLACES = (mav.MAVLINK_MSG_ID_HOME_POSITION, mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 
+POSE = attrgetter("time", "north", "east", "yaw", "speed", "yaw_rate")
+
 with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as _file:
     ROWS = [tuple(row.values()) for row in csv.DictReader(_file)]
 #: m/s that was asked, by mark
 ASKED = {mark: float(numbers.split()[0]) for mark, do, numbers, _ in ROWS if do == "stream"}
 
 
-@dataclass(repr=False)  # the logs are long, and asyncio shows the result of a task
 class Moment:
-    """One manoeuvre, as a client and the judge of the truth saw it; times in s."""
+    """One manoeuvre, as a client and the judge of the truth saw it; times in s.
 
-    mark: str
-    make: Autopilot
-    begin: float
-    end: float
-    log: list[Heard]  # of the whole drive
-    answers: list[Answer]
-    places: list[Place]  # the true ones
+    Of each true place: the time since the beginning, s; yaw, rad, beyond a full turn if it turned
+    that far; speed, m/s, and as it was asked (a PX4 follows a velocity over ground); yaw rate,
+    rad/s; metres driven from the first place.
+    """
+
+    def __init__(
+        self, mark: str, begin: float, end: float, driver: Driver, places: list[Place]
+    ) -> None:
+        self.mark, self.begin, self.end = mark, begin, end
+        self.log, self.answers = driver.observer.log, driver.observer.answers  # of the whole drive
+        true = np.array([POSE(place) for place in places]).reshape(-1, 6).T
+        self.time, self.yaw, self.speed, self.yaw_rate = (
+            true[0] - begin,
+            np.unwrap(true[3]),
+            true[4],
+            true[5],
+        )
+        course = np.cos(self.yaw - self.yaw[:1]) if driver.make.is_px4 else 1.0
+        self.along = self.speed * course
+        steps = np.hypot(np.diff(true[1]), np.diff(true[2]))
+        self.way = np.concatenate(([0.0], np.cumsum(steps)))
 
     def heard(self, name: str, before: float = 0.0) -> list[Heard]:
         """Return the messages of that name, also those since ``before`` seconds before it."""
@@ -60,40 +75,6 @@ class Moment:
         """Return a row of values for each field of those messages."""
         rows = [[getattr(row.message, each) for each in fields] for row in self.heard(name, before)]
         return np.array(rows).T
-
-    def _true(self, name: str) -> NDArray[np.float64]:
-        return np.array([getattr(place, name) for place in self.places])
-
-    @cached_property
-    def time(self) -> NDArray[np.float64]:
-        """Time of each true place since the beginning, s."""
-        return self._true("time") - self.begin
-
-    @cached_property
-    def yaw(self) -> NDArray[np.float64]:
-        """True yaw, rad, beyond a full turn if it turned that far."""
-        return np.unwrap(self._true("yaw"))
-
-    @cached_property
-    def speed(self) -> NDArray[np.float64]:
-        """True speed, m/s."""
-        return self._true("speed")
-
-    @cached_property
-    def along(self) -> NDArray[np.float64]:
-        """Speed as it was asked, m/s: a PX4 follows a velocity over ground."""
-        return self.speed * (np.cos(self.yaw - self.yaw[0]) if self.make.is_px4 else 1.0)
-
-    @cached_property
-    def yaw_rate(self) -> NDArray[np.float64]:
-        """True yaw rate, rad/s."""
-        return self._true("yaw_rate")
-
-    @cached_property
-    def way(self) -> NDArray[np.float64]:
-        """Metres driven from the first true place to each."""
-        steps = np.hypot(np.diff(self._true("north")), np.diff(self._true("east")))
-        return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 @dataclass
@@ -122,8 +103,8 @@ class Drive:
         moments: dict[str, Moment] = {}
         for number, (begin, mark) in enumerate(self.marks[:-1]):
             end = self.marks[number + 1][0]
-            seen = (observer.log, observer.answers, self.truth.between(begin, end))
-            moments.setdefault(mark, Moment(mark, driver.make, begin, end, *seen))
+            places = self.truth.between(begin, end)
+            moments.setdefault(mark, Moment(mark, begin, end, driver, places))
         return moments
 
     def _mark(self, name: str) -> None:
