@@ -40,7 +40,6 @@ RIDE_HEIGHT = 0.15  # m, ground to the base's origin, as in the URDFs
 SETTLING = 0.5  # s, from the drop onto the wheels to rest
 WHEEL_SPREAD = 0.05  # of the friction; how far one wheel may deviate from the ground's value
 WHEELS = 4
-VIEW_DISTANCE = 4.0  # m, of the window's camera
 
 
 class BulletBody:
@@ -66,8 +65,6 @@ class BulletBody:
     ) -> None:
         self._p = _pybullet()
         self._client: int = self._p.connect(self._p.GUI if gui else self._p.DIRECT)
-        if gui:
-            self._show_ground(start)
         self._steps = 1  # physics steps to one stepSimulation
         self._demand = (0.0, 0.0)
         self._time = 0.0
@@ -134,18 +131,6 @@ class BulletBody:
         if self._client >= 0:
             self._p.disconnect(self._client)
             self._client = -1
-
-    def _show_ground(self, start: Pose) -> None:
-        """Show the ground from above and behind the start, north up, without any panels."""
-        p, client = self._p, self._client
-        p.configureDebugVisualizer(p.COV_ENABLE_GUI, 0, physicsClientId=client)
-        p.resetDebugVisualizerCamera(
-            cameraDistance=VIEW_DISTANCE,
-            cameraYaw=-90,
-            cameraPitch=-50,
-            cameraTargetPosition=(start.north + 1.0, -start.east, 0.0),
-            physicsClientId=client,
-        )
 
     def _build(self, start: Pose, urdf: Path) -> int:
         p, client = self._p, self._client

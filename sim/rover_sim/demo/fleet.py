@@ -62,7 +62,7 @@ def _drive(ends: ExitStack, url: str, body: str) -> int:
         until_it_has_all(GATEWAYS[0])
     killed, survivor = GATEWAYS
     client = ends.enter_context(SyncClient(f"udpout:127.0.0.1:{ports[-1]}", timeout=LIMIT))
-    _wait(lambda: _are_ready(client), "rovers that are ready")
+    _wait(lambda: len(client.vehicles()) == len(ROVERS), "rovers that are known")
     for name in GATEWAYS:
         echo(f"gateway {name} has {_named(held_by(url, name))}")
     tasks = {rover: client.submit(Move(METRES), vehicle=rover) for rover in ROVERS}
@@ -111,10 +111,3 @@ def held_by(url: str, gateway: str) -> list[int]:
 
 def _named(rovers: Sequence[int]) -> str:
     return f"rovers {', '.join(map(str, rovers))}" if rovers else "no rover"
-
-
-def _are_ready(client: SyncClient) -> bool:
-    rovers = client.vehicles()
-    return len(rovers) == len(ROVERS) and all(
-        rover.is_ready and rover.position_age is not None for rover in rovers
-    )

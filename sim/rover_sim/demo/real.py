@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-import socket
 import sys
 import tempfile
 import time
@@ -19,8 +18,6 @@ from rover_sim.observing.observer import Observer
 from rover_sim.observing.track import Track
 from rover_sim.observing.truth import from_file
 from rover_sim.testing.processes import LOOK, Process, free_ports, module
-
-PAGE_PORT = 8560  # the page's usual one
 
 
 def drive(*, body: str, gui: bool, seed: int, record: str, web: bool) -> tuple[ThirdParty, Track]:
@@ -62,8 +59,7 @@ def drive(*, body: str, gui: bool, seed: int, record: str, web: bool) -> tuple[T
         if web:
             keys = folder / "keys.toml"  # none: nobody needs a token, whatever keys the user has
             keys.touch(mode=0o600)
-            port = PAGE_PORT if _is_free(PAGE_PORT) else 0
-            text = f"web --server {server} --listen 127.0.0.1:{port} --store"
+            text = f"web --server {server} --listen 127.0.0.1:0 --store"
             page = start("mav_tasks.cli", text, store, "--keys", str(keys))
             url = page.said(r"web page: (\S+)")[1]
             typer.echo(f"web page: {url}")
@@ -79,13 +75,3 @@ def drive(*, body: str, gui: bool, seed: int, record: str, web: bool) -> tuple[T
                     check()
                     time.sleep(LOOK)
         return found
-
-
-def _is_free(port: int) -> bool:
-    """Return whether nobody serves on a TCP port of the loopback."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        with suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return True
-        return False
