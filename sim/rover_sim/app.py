@@ -18,7 +18,7 @@ from typing import Annotated, Literal, NamedTuple, NoReturn, TextIO
 import typer
 from typer import BadParameter, Option
 
-from mav_tasks.basics.errors import KeyRingError, LinkOpenError
+from mav_tasks.basics.errors import MavTasksError, UsageError
 from mav_tasks.links.base import Link
 from mav_tasks.links.link_limits import TO_CLIENTS
 from mav_tasks.links.udp import UdpUrl
@@ -81,10 +81,6 @@ def read_sticks(text: str) -> StickPulses:
     ):
         raise BadParameter(f"must be one or two pulses of {least} to {most}")
     return StickPulses(*map(int, parts))
-
-
-class StartError(Exception):
-    """The simulator cannot start; the message is one line for the user."""
 
 
 def between(least: float, most: float) -> Callable[[str | float], float]:
@@ -276,7 +272,7 @@ def sim(
                 sys.stdout.write(f"rover_sim: rover {number} ({what}) on udp {where}\n")
             sys.stdout.flush()
             drive(link, rovers, clock, poses, FaultPlayer(faults, rovers))
-    except (StartError, LinkOpenError, MissingExtra) as error:
+    except (MavTasksError, MissingExtra, OSError) as error:
         sys.stderr.write(f"rover_sim: {error}\n")
         raise typer.Exit(USAGE_ERROR) from None
     except KeyboardInterrupt:
@@ -300,10 +296,7 @@ def _plan(texts: list[str], make: Persona, numbers: range) -> list[PlannedFault]
 def _key(name: str, ring_file: str) -> Key:
     from mav_tasks.config.key_ring.ring_file import load, path_of_ring  # noqa: PLC0415  # slow
 
-    try:
-        return load(path_of_ring(ring_file)).ring.usable_key(name)
-    except KeyRingError as error:
-        raise StartError(f"--sign {name}: {error}") from error
+    return load(path_of_ring(ring_file)).ring.usable_key(name)
 
 
 def _end_on_signals(stack: ExitStack) -> None:
@@ -322,7 +315,7 @@ def _end_on_signals(stack: ExitStack) -> None:
 def _open_link(host: str, port: int, *, is_allowed: bool) -> Link:
     url = UdpUrl("udpin", host, port)
     if not url.is_nearby and not is_allowed:
-        raise StartError(
+        raise UsageError(
             f"{host} is not a loopback address and MAVLink here is not signed:"
             " use --sign NAME, or --insecure to allow that"
         )
@@ -330,10 +323,7 @@ def _open_link(host: str, port: int, *, is_allowed: bool) -> Link:
 
 
 def _open_truth(name: str, stack: ExitStack) -> TextIO:
-    try:
-        truth = stack.enter_context(Path(name).open("a", encoding="ascii"))  # noqa: SIM115
-    except OSError as error:
-        raise StartError(f"{name}: {error.strerror}") from error
+    truth = stack.enter_context(Path(name).open("a", encoding="ascii"))  # noqa: SIM115
     if truth.tell() == 0:
         truth.write(TRUTH_HEADER)
     return truth

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import development as mav
 
 from rover_sim.observing.driver import Driver
-from rover_sim.observing.observer import Heard
+from rover_sim.observing.observer import Heard, until
 from rover_sim.observing.track import Place, Track
 
 #: s from a real rover's first message to its first HEARTBEAT, by which a driver detects it. The
@@ -135,7 +135,7 @@ class Drive:
             in_control = in_control or (await driver.take_control()).is_accepted
             await driver.hold()
             await driver.arm()
-            await driver.observer.until(lambda: driver.is_armed, RETRY)
+            await until(lambda: driver.is_armed, RETRY)
         self._mark("armed for the first time")
         await asyncio.sleep(1.0)
         await driver.arm(on=False)

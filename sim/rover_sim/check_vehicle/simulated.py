@@ -3,6 +3,7 @@
 import math
 import statistics
 from collections.abc import Callable, Coroutine, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -66,11 +67,8 @@ def in_its_world(make: Make, seed: int, run: Callable[[Link, Track], Coroutine[A
 
 async def drive(link: Link, truth: Track) -> dict[str, Moment]:
     """Drive a rover through the manoeuvres."""
-    observer = Observer(link, keeps=True)
-    try:
+    with closing(Observer(link, keeps=True)) as observer:
         return await Drive(Driver(observer), truth).run()
-    finally:
-        observer.close()
 
 
 def measure(name: str, *, seed: int) -> Iterator[tuple[Row, Value]]:

@@ -13,7 +13,7 @@ from rich.table import Table
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.messages import TaskStatus
 from mav_tasks.tasks.lifecycle import TaskState
-from rover_sim.observing.observer import AUTOPILOT, Answer, Heard, Observer
+from rover_sim.observing.observer import AUTOPILOT, Answer, Heard, Observer, until
 from rover_sim.observing.track import Place
 
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, STATUS_INTERVAL = 512, 511, 200_000  # µs
@@ -94,19 +94,19 @@ class ThirdParty:
         """Submit, and wait for the end; give up after PATIENCE."""
         self.observer.listeners.append(self._take)
         end = self.observer.now + PATIENCE
-        await self.observer.until(lambda: self._positions >= POSITIONS, PATIENCE)
+        await until(lambda: self._positions >= POSITIONS, PATIENCE)
         await self._command(SET_MESSAGE_INTERVAL, TaskStatus.id, STATUS_INTERVAL)
         first = self.tasks[0]
         for task in self.tasks:
             await self._submit(task)
             if first.is_accepted:  # it must start at once, so that later ones wait
-                await self.observer.until(lambda: first.state >= STARTING, PATIENCE)
+                await until(lambda: first.state >= STARTING, PATIENCE)
         while not self._is_over() and self.observer.now < end:
             self.check()
             for task in self.tasks:
                 if task.state < EXECUTING:
                     await self._command(REQUEST_MESSAGE, TaskStatus.id, task.task_id)
-            await self.observer.until(self._is_over, ASK_AGAIN)
+            await until(self._is_over, ASK_AGAIN)
         return self
 
     def _is_over(self) -> bool:

@@ -10,7 +10,7 @@ from math import cos, hypot, inf, isfinite, sin
 
 from pymavlink.dialects.v20 import development as mav
 
-from rover_sim.observing.observer import AUTOPILOT, Answer, Heard, Observer
+from rover_sim.observing.observer import AUTOPILOT, Answer, Heard, Observer, until
 from rover_sim.observing.track import Place, Track
 
 PERIOD = 0.05  # s between setpoints, 20 Hz
@@ -135,9 +135,7 @@ class Driver:
             await self.zeros(3 * PERIOD)
             await self.hold()
             await self.arm(on=False)
-            if await self.observer.until(
-                lambda: self.mode == self.make.hold and not self.is_armed, 1.5
-            ):
+            if await until(lambda: self.mode == self.make.hold and not self.is_armed, 1.5):
                 return True
         return False
 

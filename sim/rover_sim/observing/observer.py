@@ -64,6 +64,17 @@ class Answer(NamedTuple):
         return f"{name} after {self.took:.2f} s"
 
 
+async def until(condition: Callable[[], object], within: float) -> bool:
+    """Wait for a condition; return whether it held in time."""
+    now = asyncio.get_running_loop().time
+    end = now() + within
+    while not condition():
+        if now() >= end:
+            return False
+        await asyncio.sleep(LOOK)
+    return True
+
+
 class Observer:
     """Implements ``Talk`` of the link driver, for the first autopilot that it hears."""
 
@@ -123,15 +134,6 @@ class Observer:
             return None
         finally:
             self._waiting = [each for each in self._waiting if each[2] is not future]
-
-    async def until(self, condition: Callable[[], object], within: float) -> bool:
-        """Wait for a condition; return whether it held in time."""
-        end = self.now + within
-        while not condition():
-            if self.now >= end:
-                return False
-            await asyncio.sleep(LOOK)
-        return True
 
     async def found(self, within: float) -> bool:
         """Wait for the first heartbeat of an autopilot; return whether it came in time."""

@@ -3,7 +3,7 @@
 import asyncio
 import tempfile
 from collections.abc import Callable, Collection
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -97,20 +97,20 @@ async def run_trial(options: Options, report: Report, *, say: Callable[[str], No
 
 def _truth(options: Options, stack: AsyncExitStack) -> tuple[Track | None, Observer | None]:
     """Return the source of true poses, and an observer on a second link, if they are there."""
+
+    def observe(url: str) -> Observer:
+        return stack.enter_context(closing(_observer(url)))
+
     truth, second = None, None
     if ":" in options.truth:
-        second = _observer(options.truth)
-        stack.callback(second.close)
+        second = observe(options.truth)
         truth = stack.enter_context(from_link(second))
     elif options.truth:
         try:
             truth = stack.enter_context(from_file(Path(options.truth)))
         except OSError as error:
             raise UsageError(f"--truth {options.truth}: {error.strerror}") from error
-    if options.stick:
-        second = _observer(options.stick)
-        stack.callback(second.close)
-    return truth, second
+    return truth, observe(options.stick) if options.stick else second
 
 
 def _observer(url: str) -> Observer:
@@ -119,17 +119,13 @@ def _observer(url: str) -> Observer:
 
 async def _identify(url: str) -> str:
     """Return make, system id and version of the rover. Raise NoAnswer if none is heard."""
-    observer = _observer(url)
-    try:
+    with closing(_observer(url)) as observer:
         if not await observer.found(HEARD_WITHIN):
             raise NoAnswer(f"no heartbeat of a rover from {url} within {HEARD_WITHIN:g} s")
         name = f"{Driver(observer).make.name}, system {observer.system}"
-        await observer.command(
-            mav.MAV_CMD_REQUEST_MESSAGE, float(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-        )
+        wanted = mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+        await observer.command(mav.MAV_CMD_REQUEST_MESSAGE, wanted)
         version = observer.message("AUTOPILOT_VERSION")
         number = 0 if version is None else version.flight_sw_version
         shown = ".".join(str(number >> shift & 0xFF) for shift in (24, 16, 8))
-        return f"{name}, firmware {shown}" if number else f"{name}, firmware not reported"
-    finally:
-        observer.close()
+        return f"{name}, firmware {shown if number else 'not reported'}"

@@ -3,7 +3,7 @@
 import asyncio
 import shlex
 from collections.abc import Awaitable, Callable, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -17,7 +17,7 @@ from mav_tasks.client.wire import Goal
 from mav_tasks.links.base import Link
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from rover_sim.observing.driver import Driver
-from rover_sim.observing.observer import Observer
+from rover_sim.observing.observer import Observer, until
 from rover_sim.observing.track import Place, Track
 
 LOOK = 0.1  # s between two looks at a condition
@@ -185,13 +185,10 @@ class Session:
 
     async def _stop_without_server(self) -> None:
         """Bring the rover to rest if it still follows setpoints, as after a killed server."""
-        observer = Observer(self.ground.rover())
-        try:
+        with closing(Observer(self.ground.rover())) as observer:
             driver = Driver(observer)
             if await observer.found(BEAT_WITHIN) and driver.mode == driver.make.control:
                 await driver.rest()
-        finally:
-            observer.close()
 
     # state
 
@@ -227,17 +224,13 @@ class Session:
 
     async def until(self, condition: Callable[[], object], *, within: float, what: str) -> None:
         """Wait for a condition. Raise TrialError with ``what`` if it does not hold in time."""
-        end = self.now + within
-        while not condition():
-            if self.now >= end:
-                raise TrialError(f"{what}: not within {within:g} s")
-            await asyncio.sleep(LOOK)
+        if not await until(condition, within):
+            raise TrialError(f"{what}: not within {within:g} s")
 
     async def rest(self) -> Place:
         """Wait until the rover stands; return its place."""
         await asyncio.sleep(SETTLE)
-        with suppress(TrialError):
-            await self.until(self.track.stands, within=STANDS_WITHIN, what="")
+        await until(self.track.stands, STANDS_WITHIN)
         return self.track.last
 
     # tasks
