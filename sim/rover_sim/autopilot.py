@@ -66,7 +66,7 @@ class Autopilot:
         self.address = address
         self._persona = persona
         errors = realism.estimator
-        self._estimator = None if errors is None else Estimator(errors, seed=seed)
+        self._estimator = None if errors is None else Estimator(errors, realism.pushing, seed=seed)
         self._departures = Departures(realism.timing, seed=seed)
         self._asked = 0.0  # m/s, the last demand
         self._outputs: Motion = (0.0, 0.0)  # of the motors

@@ -81,9 +81,6 @@ class BulletBody:
         self.advance(SETTLING)
         self._time = 0.0
 
-    def __repr__(self) -> str:
-        return f"BulletBody(client={self._client}, t={self._time:.2f} s)"
-
     @property
     def state(self) -> BodyState:
         """The state after the last ``advance``."""

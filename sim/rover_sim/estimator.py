@@ -51,7 +51,7 @@ def in_radians(error: Wander) -> Wander:
 class Estimator:
     """Sees the truth with errors. The same seed gives the same errors, step for step."""
 
-    def __init__(self, error: EstimatorError, *, seed: int) -> None:
+    def __init__(self, error: EstimatorError, pushing: PushingError | None, *, seed: int) -> None:
         chance = Random(seed)
         self._forward = wandering(error.forward_speed, chance)
         self._right = wandering(error.lateral_speed, chance)
@@ -63,7 +63,7 @@ class Estimator:
         self._drift_north, self._drift_east = (
             repeat(0.0) if drift is None else wandering(drift, chance) for _ in range(2)
         )
-        self._upset = None if error.pushing is None else Upset(error.pushing, chance)
+        self._upset = None if pushing is None else Upset(pushing, chance)
 
     def see(self, truth: BodyState, *, asked: float) -> BodyState:
         """Advance by one control period; return the state that the rover believes.

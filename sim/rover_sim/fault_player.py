@@ -2,12 +2,17 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
-from functools import reduce
-from operator import or_
+from typing import Any
 
 from rover_sim.fault_plan import PlannedFault
 from rover_sim.faults import NO_FAULTS, Faults
 from rover_sim.vehicle import Vehicle
+
+FLAGS_AND_SETS = [
+    field.name
+    for field in fields(Faults)
+    if isinstance(getattr(NO_FAULTS, field.name), bool | frozenset)
+]
 
 
 class FaultPlayer:
@@ -57,9 +62,9 @@ class FaultPlayer:
 
 def joined(faults: Sequence[Faults]) -> Faults:
     """Return the union of flags and sets, the only faults in plans."""
-    changes = {}
-    for field in fields(Faults):
-        values = [getattr(each, field.name) for each in faults or (NO_FAULTS,)]
-        is_joined = isinstance(values[0], bool | frozenset)
-        changes[field.name] = reduce(or_, values) if is_joined else values[0]
+    changes: dict[str, Any] = {}
+    for each in faults:
+        for name in FLAGS_AND_SETS:
+            value = getattr(each, name)
+            changes[name] = changes.get(name, value) | value
     return Faults(**changes)

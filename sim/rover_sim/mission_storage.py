@@ -21,11 +21,13 @@ from rover_sim.setpoints import Destination
 NAV_WAYPOINT = 16
 GUIDED_ITEM = 2  # MISSION_ITEM.current
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255  # MAV_MISSION_TYPE
-NAVIGATION = frozenset({16, 17, 18, 19, 20, 42, 82, 83, 92, 93, 94, 112, 113, 114, 115})
-DO = frozenset(range(177, 220))
-AIRBORNE = frozenset({21, 22, 31, 84, 85, 530, 531, 532, 1000, 1001, 2000, 2001, 2500, 2501})
-FENCES = frozenset(range(5000, 5005))
-RALLIES = frozenset({5100})
+#: the MAV_CMDs that every make stores, by mission type: navigation, and "do"
+STORED = {
+    MISSION: {16, 17, 18, 19, 20, 42, 82, 83, 92, 93, 94, 112, 113, 114, 115, *range(177, 220)},
+    FENCE: set(range(5000, 5005)),
+    RALLY: {5100},
+}
+AIRBORNE = {21, 22, 31, 84, 85, 530, 531, 532, 1000, 1001, 2000, 2001, 2500, 2501}
 
 Item = m.MissionItemInt | m.MissionItem
 
@@ -50,12 +52,6 @@ class MissionConventions:
     timeout_result: MavMissionResult | None = None  # the ack that ends an upload; None: silence
     full_text: str = ""
     wrong_sequence: MavMissionResult | None = None  # to an unrequested item; None: silence
-
-    @property
-    def storable(self) -> Mapping[int, frozenset[int]]:
-        """The MAV_CMDs that can be stored, by mission type."""
-        mission = NAVIGATION | DO | (AIRBORNE if self.stores_airborne else frozenset())
-        return {MISSION: mission, FENCE: FENCES, RALLY: RALLIES}
 
 
 @dataclass(slots=True)
@@ -254,7 +250,8 @@ class MissionStorage:
         self._on.outbox.send(message)
 
     def _refusal(self, item: Item, mission_type: int) -> MavMissionResult | None:
-        if item.command not in self._conventions.storable[mission_type]:
+        flies = mission_type == MISSION and self._conventions.stores_airborne
+        if item.command not in STORED[mission_type] | (AIRBORNE if flies else set()):
             return MavMissionResult.UNSUPPORTED
         latitude, longitude = _place_of(item)
         if not is_on_earth(latitude, 0):

@@ -129,18 +129,13 @@ class Persona:
     def on(self, frame: Frame) -> "Persona":
         """Return the same make on another frame; its parameters identify the frame."""
         own = self.frames[frame if frame is Frame.ACKERMANN else Frame.SKID]
-        estimators = {
-            gps: replace(error, pushing=own.pushing) for gps, error in self.estimators.items()
-        }
-        return replace(
-            self,
-            frame=frame,
-            parameters=own.parameters,
-            estimators=estimators,
-            realism=replace(
-                self.realism, estimator=estimators[Gps.FINE], stick_speed=own.stick_speed
-            ),
+        realism = replace(
+            self.realism,
+            estimator=self.estimators[Gps.FINE],
+            pushing=own.pushing,
+            stick_speed=own.stick_speed,
         )
+        return replace(self, frame=frame, parameters=own.parameters, realism=realism)
 
 
 def _table(name: str) -> dict[str, Any]:

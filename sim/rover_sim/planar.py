@@ -31,9 +31,6 @@ class PlanarBody:
         self.state = BodyState(0.0, start.north, start.east, 0.0, wrap_angle(start.yaw), *STANDING)
         self._demanded_speed = 0.0
 
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.state})"
-
     def advance(self, duration: float) -> None:
         """Move by ``duration`` seconds."""
         parts = max(1, math.ceil(duration / LONGEST_STEP - 1e-9))

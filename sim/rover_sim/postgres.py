@@ -50,9 +50,6 @@ class PostgresServer:
         # what initdb writes is synced by the first checkpoint; a crash before that loses a test
         self.run("initdb", "--no-sync", *how, "-D", str(data))
 
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}(port {self.port})"
-
     def is_running(self) -> bool:
         """Return whether the process exists."""
         return self._process is not None and self._process.poll() is None

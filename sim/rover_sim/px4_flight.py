@@ -121,7 +121,7 @@ class Px4Flight(Flight):
             action = persona.stick_loss.get(int(values["NAV_RCL_ACT"]), "")
         if not action:
             return
-        self._complain("Failsafe activated")
+        self.on.outbox.say(MavSeverity.CRITICAL, "Failsafe activated")
         if action == "disarm":
             self.set_armed(False)
             return
@@ -132,15 +132,12 @@ class Px4Flight(Flight):
             self.on.outbox.inform(f"RTL: start return at {height} m {above}")
         self._switch(Mode(action))
 
-    def _complain(self, text: str) -> None:
-        self.on.outbox.say(MavSeverity.CRITICAL, text)
-
     def take(self, message: Local | Global) -> None:
         """Count a setpoint; in OFFBOARD follow it."""
         on = self.on
         reading = read_px4(message, on.estimate, on.origin, yaw_rate=on.persona.honours_yaw_rate)
         if isinstance(reading, str):
-            self._complain(reading)
+            self.on.outbox.say(MavSeverity.CRITICAL, reading)
             return
         self._gap, self._last_setpoint = on.now - self._last_setpoint, on.now
         if self.mode is Mode.GUIDED:

@@ -47,7 +47,6 @@ class EstimatorError:
     yaw: Wander  # deg
     yaw_rate: Wander  # deg/s
     drift: Wander | None = None  # m, north and east, over minutes; None: included in position
-    pushing: PushingError | None = None  # None: pushing has no effect
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +90,7 @@ class Realism:
     boot: BootTimes
     timing: LinkTiming
     estimator: EstimatorError | None = None  # None: the estimate is the truth
+    pushing: PushingError | None = None  # None: pushing has no effect
     stick_speed: float | None = None  # m/s at full throttle, in GUIDED. None: ignored
     tells_origin: bool = True  # GPS_GLOBAL_ORIGIN
 

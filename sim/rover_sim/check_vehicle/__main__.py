@@ -24,8 +24,9 @@ def main(
     for name in names:
         typer.echo(f"{name}: simulated, beside {ROVERS[name].real}")
         for row, value in measure(name, seed=0):
-            differing += not row.is_right(value)
-            verdict = "ok" if row.is_right(value) else "DIFFERS"
+            is_right = row.is_right(value)
+            differing += not is_right
+            verdict = "ok" if is_right else "DIFFERS"
             typer.echo(
                 f"{verdict}: {row.name}: {shown(value)}, real: {row.real} {row.why}".rstrip()
             )

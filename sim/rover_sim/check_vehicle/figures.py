@@ -44,9 +44,10 @@ MODES = {
     11: "RTL",
     15: "GUIDED",
     16: "INITIALISING",
-    **{main << 16 | sub << 24: name for main, sub, name in ((4, 3, "HOLD"), (4, 5, "RTL"))},
-    4 << 16 | 6 << 24: "LAND",
-    6 << 16: "OFFBOARD",
+    0x03040000: "HOLD",  # of PX4: sub mode, main mode
+    0x05040000: "RTL",
+    0x06040000: "LAND",
+    0x00060000: "OFFBOARD",
 }
 GUIDED = 15
 

@@ -5,6 +5,7 @@ priority 5 wait, and the one with the higher priority runs first. Exit status 0:
 order, states and the measured movement are correct; 1: some are wrong; 2: it cannot be run.
 """
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -17,7 +18,6 @@ from rover_sim.demo import fast as virtual
 from rover_sim.demo import real
 from rover_sim.errors import MissingExtra
 from rover_sim.observing.picture import draw
-from rover_sim.observing.track import Track
 from rover_sim.testing.processes import ProcessFailed
 
 PICTURE = "track.png"
@@ -77,22 +77,17 @@ def demo(
             else:
                 party, track = real.drive(body=kind, seed=seed, record=record, gui=gui, web=web)
             wrong = party.conclude()
-            if not gui:
-                _draw(track, output.resolve() / PICTURE)
+            picture = output.resolve() / PICTURE
+            if not gui and find_spec("matplotlib") is None:
+                _say(NO_PICTURE)
+            elif not gui:
+                draw({"Track of the rover": track.places}, picture)
+                typer.echo(f"picture of the track: {picture}")
     except (ProcessFailed, MissingExtra, MavTasksError, OSError) as error:
         _say(str(error))
         raise typer.Exit(USAGE) from error
     _say(f"{wrong} wrong" if wrong else "all correct")
-    raise typer.Exit(int(wrong > 0))
-
-
-def _draw(track: Track, picture: Path) -> None:
-    try:
-        draw({"Track of the rover": track.places}, picture)
-    except ImportError:
-        _say(NO_PICTURE)
-    else:
-        typer.echo(f"picture of the track: {picture}")
+    raise typer.Exit(wrong > 0)
 
 
 def _say(text: str) -> None:

@@ -4,6 +4,7 @@ It submits each task once the previous one is acknowledged.
 """
 
 import math
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -38,11 +39,14 @@ class Task:
     tolerance: float  # the rover's own estimate is off by 2 to 4 cm
     is_accepted: bool | None = None
     task_id: int = 0
-    state: int = 0
-    text: str = ""
-    seconds: float = math.nan
+    status: TaskStatus | None = None  # the last one
     began: Place | None = None
     ended: Place | None = None
+
+    @property
+    def state(self) -> int:
+        """The state of the last status; 0: unknown."""
+        return self.status.state if self.status else 0
 
     @property
     def is_over(self) -> bool:
@@ -131,17 +135,16 @@ class ThirdParty:
         elif isinstance(status := self._decoder.decode(heard.packet), TaskStatus):
             for task in self.tasks:
                 if task.task_id == status.task_id and status.state >= task.state:
-                    self._follow(task, status.state, status.text)
-                    task.seconds = status.execution_time
+                    self._follow(task, status)
 
-    def _follow(self, task: Task, state: int, text: str) -> None:
-        if state != task.state and state == EXECUTING:
+    def _follow(self, task: Task, status: TaskStatus) -> None:
+        before, task.status = task.status, status
+        if before is None or status.text != before.text:
+            self.say(f"task {task.task_id}: {status.text}")
+        if status.state == EXECUTING and task.began is None:
             task.began = self.truth()
-        elif state != task.state and state >= COMPLETED:
+        elif status.state >= COMPLETED and task.ended is None:
             task.ended = self.truth()
-        if text != task.text:
-            self.say(f"task {task.task_id}: {text}")
-        task.state, task.text = state, text
 
     def order(self, task: Task) -> int:
         """Return which one a task was in the order of execution, from 1; 0 if it did not run."""
@@ -154,16 +157,16 @@ class ThirdParty:
         for heading in "id", "type", "prio", "order", "state", "time", "asked", "measured", "error":
             table.add_column(heading, justify="left" if heading in ("type", "state") else "right")
         for task in self.tasks:
+            took = task.status.execution_time if task.status else math.nan
             digits = (
                 3 if task.unit == "m" else 2
             )  # measured and error in the unit of what was asked
             table.add_row(
                 *(str(task.task_id), task.name, str(task.priority), str(self.order(task) or "-")),
-                *(task.state_name, f"{task.seconds:.1f} s", f"{task.amount:g} {task.unit}"),
+                *(task.state_name, f"{took:.1f} s", f"{task.amount:g} {task.unit}"),
                 *(f"{task.measured:.{digits}f}", f"{task.measured - task.amount:+.{digits}f}"),
             )
-        console = Console()
-        (console if console.is_terminal else Console(width=PIPE_WIDTH)).print(table)
+        Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(table)
         wrong = list(self._problems())
         for problem in wrong:
             self.say(f"WRONG: {problem}")

@@ -25,7 +25,6 @@ def draw(tracks: Mapping[str, Sequence[Place]], path: Path) -> None:
             axes.plot(place.east, place.north, marker, label=label)
         axes.set(xlabel="east, m", ylabel="north, m")
         axes.set_aspect("equal", adjustable="datalim")
-        axes.margins(0.1)
         axes.grid(visible=True, alpha=0.3)
         axes.legend()
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -45,10 +45,8 @@ class LossyLink:
         """Lose and duplicate (probabilities 0–1) and delay (s) datagrams, both ways.
 
         ``jitter`` is the largest extra delay of a datagram, so that datagrams can overtake each
-        other. Raise ValueError for another leg.
+        other.
         """
-        if leg not in LEGS:
-            raise ValueError(f"leg must be one of {', '.join(LEGS)}, not {leg!r}")
         how = Conditions(delay=delay, jitter=jitter, loss=loss, duplication=duplication)
         end = ExitStack()
         end.callback(setattr, self._net, "ways", self._net.ways)

@@ -6,7 +6,7 @@ when a test requests a fixture.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 MARKER = "simulated_rover"
 TITLE = "simulated rover"
 OURS = ("mav_tasks", "rover_sim")
-WORLD = pytest.StashKey["RoverWorld"]()
-REAL_TIME = pytest.StashKey["RealTime"]()
+DESCRIBE = pytest.StashKey[Callable[[], str]]()  # the state of what a test simulates
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -70,12 +69,8 @@ def pytest_runtest_makereport(
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Add the rover's state and the seed to the report of a failing test."""
     report = yield
-    if report.failed and (world := item.stash.get(WORLD, None)) is not None:
-        from rover_sim.testing.report import describe_world  # noqa: PLC0415
-
-        report.sections.append((TITLE, describe_world(world)))
-    if report.failed and (real_time := item.stash.get(REAL_TIME, None)) is not None:
-        report.sections.append((TITLE, real_time.describe()))
+    if report.failed and (describe := item.stash.get(DESCRIBE, None)):
+        report.sections.append((TITLE, describe()))
     return report
 
 
@@ -93,6 +88,7 @@ def rover_world(
 ) -> Iterator[RoverWorld]:
     """Return the test's world, with ``run`` for a coroutine, ``sleep``, ``until``, ``client``."""
     from rover_sim.errors import MissingExtra  # noqa: PLC0415
+    from rover_sim.testing.report import describe_world  # noqa: PLC0415
     from rover_sim.testing.rover_world import RoverWorld  # noqa: PLC0415
 
     options, seed = _options_of(request)
@@ -100,9 +96,9 @@ def rover_world(
         world = RoverWorld(options, seed=seed, settings=task_server_settings)
     except MissingExtra as error:
         pytest.fail(f"@pytest.mark.{MARKER}: {error}", pytrace=False)
-    request.node.stash[WORLD] = world
+    request.node.stash[DESCRIBE] = lambda: describe_world(world)
     yield world
-    del request.node.stash[WORLD]  # the world stays inspectable until its last test is over
+    del request.node.stash[DESCRIBE]  # the world stays inspectable until its last test is over
     world.close()
 
 
@@ -148,9 +144,9 @@ def _real_time(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[RealT
 
     options, seed = _options_of(request)
     real_time = RealTime(options, seed=seed, folder=tmp_path)
-    request.node.stash[REAL_TIME] = real_time
+    request.node.stash[DESCRIBE] = real_time.describe
     yield real_time
-    del request.node.stash[REAL_TIME]
+    del request.node.stash[DESCRIBE]
     real_time.close()
 
 

@@ -6,18 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-MOST_TASKS = 8  # described at most
-
 
 def describe_tasks(loop: asyncio.AbstractEventLoop) -> str:
     """Return a line for each coroutine in which a task of the loop waits, outermost first."""
-    tasks = sorted(asyncio.all_tasks(loop), key=lambda task: task.get_name())
-    lines = [
+    tasks = sorted(asyncio.all_tasks(loop), key=asyncio.Task.get_name)
+    return "".join(
         line
-        for task in tasks[:MOST_TASKS]
+        for task in tasks
         for line in (f"\n  {task.get_name()} waits:", *_places(task.get_coro()))
-    ]
-    return "".join(lines) + f"\n  and {len(tasks) - MOST_TASKS} more" * (len(tasks) > MOST_TASKS)
+    )
 
 
 def _places(awaitable: Any) -> Iterator[str]:

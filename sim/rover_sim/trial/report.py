@@ -95,6 +95,5 @@ class Report:
             "poses": source,
             "settings": ", ".join(self.settings) or "default",
             "mav-tasks": version("mav-tasks"),
-            "pymavlink": version("pymavlink"),
             "Python": f"{platform.python_version()} on {platform.system()} {platform.machine()}",
         }

@@ -1,6 +1,7 @@
 """Rows: STOP at 1 m/s beside the rover's own ways to stop, and the throttle stick of a person."""
 
 import asyncio
+from contextlib import closing
 from statistics import median
 
 from pymavlink.dialects.v20 import development as mav
@@ -27,22 +28,20 @@ LONG = 8.0  # m, of a move that lasts longer than the push
 
 async def measure(session: Session) -> float | None:
     """Measure zeros and HOLD without the server; return the better way's median, m, or None."""
-    observer = Observer(session.ground.rover())
-    driver = Driver(observer, farthest=FARTHEST, keeps_course=True)
     distances: dict[str, list[float]] = {"zeros": [], "HOLD": []}
-    try:
+    with closing(Observer(session.ground.rover())) as observer:
+        driver = Driver(observer, farthest=FARTHEST, keeps_course=True)
         if not await observer.found(HEARD_WITHIN):
             raise TrialError(f"no heartbeat of a rover within {HEARD_WITHIN:g} s")
-        for _ in range(RUNS):
-            for way, found in distances.items():
-                metres = await _stop_by(way, driver, session)
-                found += [] if metres is None else [metres]
-    except Interference as error:
-        session.say(f"  not measured: {error}")
-    finally:
-        if observer.message("HEARTBEAT") is not None:
+        try:
+            for _ in range(RUNS):
+                for way, found in distances.items():
+                    metres = await _stop_by(way, driver, session)
+                    found += [] if metres is None else [metres]
+        except Interference as error:
+            session.say(f"  not measured: {error}")
+        finally:
             await driver.rest()
-        observer.close()
     for way, values in distances.items():
         session.say(f"  {way}: {', '.join(f'{value:.2f}' for value in values)} m")
     return min((median(values) for values in distances.values() if values), default=None)
