@@ -1,9 +1,11 @@
 """``mav-tasks trial``: drive a rover through a table of requirements, and write a report."""
 
 import asyncio
+import shlex
 import signal
 import sys
 from pathlib import Path
+from shutil import which
 from typing import Annotated
 
 import typer
@@ -109,6 +111,7 @@ async def trial(
     rows = only.split(",")
     if unknown := [name for name in rows if name not in ROOM]:
         raise UsageError(f"--only {','.join(unknown)}: rows are {', '.join(ROOM)}")
+    _check(keep, reboot_command)
     written = Report(report, url, set_ or ())
     written.check(may_replace=force)
     out.warn(why_no_picture())
@@ -134,6 +137,14 @@ async def trial(
             out.say(f"report: {report}")
     if written.has_failed:
         raise typer.Exit(FAILED)
+
+
+def _check(keep: str, reboot_command: str) -> None:
+    """Raise UsageError for what would fail once the rover drives."""
+    if keep and Path(keep).is_dir() and any(Path(keep).iterdir()):
+        raise UsageError(f"--keep {keep} is not empty: an earlier queue would be driven first")
+    if reboot_command and which((shlex.split(reboot_command) or [""])[0]) is None:
+        raise UsageError(f"--reboot-command {reboot_command}: there is no such program")
 
 
 def _confirm(rows: list[str]) -> None:

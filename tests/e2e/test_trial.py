@@ -56,7 +56,14 @@ def test_ctrl_c_stops_the_rover_and_ends_the_server(tmp_path: Path) -> None:
             assert "server stopped" in log.read_text()
 
 
-def test_it_does_not_drive_unasked(tmp_path: Path) -> None:
-    with process(*trial(1), folder=tmp_path, name="trial") as run:
-        assert run.popen.wait(30) == 2
-        assert "the rover drives: without a terminal, add --yes" in run.text
+def test_it_does_not_drive_unasked_or_with_what_cannot_be(tmp_path: Path) -> None:
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept/store.db").touch()
+    for more, words in (
+        ((), "the rover drives: without a terminal, add --yes"),
+        (("--yes", "--keep", "kept"), "--keep kept is not empty"),
+        (("--yes", "--reboot-command", "no-such x"), "no-such x: there is no such program"),
+    ):
+        with process(*trial(1, *more), folder=tmp_path, name="trial") as run:
+            assert run.popen.wait(30) == 2
+            assert words in run.text
