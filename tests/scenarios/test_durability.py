@@ -9,8 +9,9 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, FAILED, TEMPORARILY_REJECTED
+from tests.kit.rows import ask
 from tests.kit.store import LateStore
-from tests.kit.world import World
+from tests.kit.world import World, put_home
 from tests.scenarios.conftest import MakeWorld
 
 
@@ -139,3 +140,23 @@ def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(
     assert world.client.statuses(1)[-1].state == S.KILLED
     not_kept = by == "kill" and delay == inf
     assert sent.answer == ((FAILED, R.STORE_UNAVAILABLE) if not_kept else (ACCEPTED, 1))
+
+
+@for_each(
+    "words",
+    ["DO_REPOSITION -1 1 0 nan frame=6 at=3,0 to=autopilot", "DO_SET_MODE 1 11 0 to=autopilot"],
+)
+def test_a_refused_word_ends_no_pause(world: World, store: LateStore, words: str) -> None:
+    put_home(world, -2, 0)
+    world.client.pause()
+    world.run(0.1)
+    store.delay = inf
+    ask(world, words)
+    world.run(1)
+    store.delay = 0.0
+    assert world.client.texts()[-1] == "not stored in time: not accepted; queue paused"
+    world.client.move(1)
+    world.run(4)
+    assert (world.states(), world.stands()) == ([S.QUEUED], True)
+    ask(world, words)
+    world.until_faster(0.2)

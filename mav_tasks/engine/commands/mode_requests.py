@@ -113,8 +113,10 @@ class ModeRequests:
         else:
             undo = partial(self._plans.stage_again, vehicle, started)
             words = "not stored in time: not started"
-            self._submissions.answer_once_durable(asked, started.id, words, undo=undo, now=now)
-        give_back(asked, now=now)
+            then = partial(give_back, asked, started.id)
+            self._submissions.answer_once_durable(
+                asked, started.id, words, undo=undo, then=then, now=now
+            )
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Start the mission of a vehicle that was to be armed first and is armed now."""

@@ -126,8 +126,6 @@ class Submissions:
             now=now,
         )
         self.await_commit(asked, task, now=now)
-        if runs_now:
-            give_back(asked, now=now)
         if words:
             asked.tell(words, MavSeverity.INFO, now=now)
 
@@ -172,11 +170,16 @@ class Submissions:
         *,
         now: float,
         undo: Effect = leave_it,
+        then: Effect = leave_it,
     ) -> None:
-        """Accept a request once what it has changed is durable, else undo it; ``words``: why."""
+        """Accept a request once what it has changed is durable, else undo it; ``words``: why.
 
-        def accept(*, now: float) -> None:  # noqa: ARG001
+        ``then``: what else is done once it is accepted.
+        """
+
+        def accept(*, now: float) -> None:
             asked.answer(MavResult.ACCEPTED, task_id)
+            then(now=now)
 
         def give_up(*, now: float) -> None:
             undo(now=now)
@@ -194,7 +197,6 @@ class Submissions:
             return
         task = self.take_in(asked.rights, vehicle, draft, runs_now=True, now=now)
         self.await_commit(asked, task, now=now)
-        give_back(asked, now=now)
 
     def submit_draft(self, asked: CommandRequest, draft: Draft, *, now: float) -> Task:
         """Submit a task that a command implies. Raise Rejection if it is refused."""
@@ -295,6 +297,7 @@ class Submissions:
             return  # retracted, and answered
         for each in self._undecided.pop(task.id):
             acknowledge(each, task.id)
+        give_back(asked, task.id, now=now)
         tasks, own, reads = asked.vehicle.tasks, asked.client, asked.client.uses_dialect
         is_blocked = tasks.immediate != task.id and bool(tasks.paused or tasks.is_held_ahead)
         knows = reads and not is_blocked and not task.choice
@@ -311,10 +314,11 @@ class Submissions:
         if task.id not in self._undecided:
             return
         askers = self._undecided.pop(task.id)
-        was_for_now = asked.vehicle.tasks.immediate == task.id
+        tasks = asked.vehicle.tasks
+        was_for_now = tasks.immediate == task.id
         self.take_back(asked.vehicle, task, now=now)
         words = "not stored in time: not accepted"
-        if was_for_now:
+        if was_for_now and tasks.paused:
             words += "; queue paused"
         refusal = Rejection(R.STORE_UNAVAILABLE, words)
         for each in askers:
@@ -368,14 +372,16 @@ class Submissions:
             asked.tell(words, MavSeverity.INFO, now=now)
 
 
-def give_back(asked: CommandRequest, *, now: float) -> None:
+def give_back(asked: CommandRequest, task_id: TaskId, *, now: float) -> None:
     """End a takeover, or the pause by a halt of the same client, if nothing else waits for that.
 
-    Call this for a request that drives the vehicle at once.
+    Call this when a task is durable that drives the vehicle at once, if nothing has halted it since
+    it was requested: a refused one must not let other tasks start.
     """
     tasks = asked.vehicle.tasks
+    is_next = tasks.immediate == task_id and task_id in tasks.waiting
     is_over = tasks.paused in TAKEN or tasks.halts.held_by is asked.sender
-    if is_over and not tasks.has_others:
+    if is_next and is_over and not tasks.has_others:
         asked.vehicle.joint.go_on(actor=asked.actor, now=now)
 
 
