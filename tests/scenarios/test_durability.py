@@ -160,3 +160,28 @@ def test_a_refused_word_ends_no_pause(world: World, store: LateStore, words: str
     assert (world.states(), world.stands()) == ([S.QUEUED], True)
     ask(world, words)
     world.until_faster(0.2)
+
+
+@for_each("words", ["TASK_MODIFY 1 9 15", "TASK_MODIFY 1 1 7"])
+def test_a_change_is_acknowledged_once_it_is_durable_else_undone(
+    world: World, store: LateStore, words: str
+) -> None:
+    world.client.command(54000, 1, 0, 0, 1, 0, 8, 5)
+    world.run(0.1)
+    before = world.task(1).terms
+    store.delay = inf
+    ask(world, words)
+    world.run(0.2)
+    ask(world, words)  # it repeats it
+    world.run(0.5)
+    store.delay = 0.0
+    world.run(0.1)
+    refused = (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
+    assert (world.client.acks_of(54012), world.task(1).terms) == ([refused] * 2, before)
+    store.delay = 0.2
+    ask(world, words)
+    world.run(0.1)
+    assert len(world.client.acks_of(54012)) == 2
+    world.run(0.2)
+    assert world.client.acks_of(54012)[2:] == [(ACCEPTED, 1)]
+    assert world.task(1).terms != before

@@ -16,7 +16,7 @@ from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, Sent
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import check
-from tests.kit.store import LateStore, PromptSqliteStore
+from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -114,18 +114,6 @@ def test_an_invalid_expression_changes_nothing(world: World, text: str, words: s
     assert sent.answer == (DENIED, R.BAD_PARAMETER)
     assert world.client.said(words)
     assert world.task(task).terms == before
-
-
-def test_that_a_task_repeats_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:
-    store = LateStore()
-    world = make_world(store=store)
-    task = submit(world)
-    store.delay = 0.2
-    sent = world.client.command(MODIFY, task, EVERY, 60)
-    world.run(0.1)
-    assert sent.ack is None
-    world.run(0.2)
-    assert sent.answer == (ACCEPTED, task)
 
 
 def test_cancel_ends_one_run_and_the_series_goes_on(world: World) -> None:

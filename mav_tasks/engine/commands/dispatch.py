@@ -29,15 +29,14 @@ from mav_tasks.kinds.commands import PARSERS
 from mav_tasks.kinds.params import bad, has_place, whole
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
-from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity, TaskProperty
+from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
 
-#: properties by which TASK_MODIFY lets a task repeat, or sends a piece of that
-REPETITION = (TaskProperty.EVERY, TaskProperty.REPEAT)
+NOT_CHANGED = "not stored in time: nothing changed"
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
 
 
@@ -179,17 +178,15 @@ class Commands:
             case (
                 MavCmd.TASK_CANCEL
                 | MavCmd.TASK_CLEAR
-                | MavCmd.TASK_MODIFY
                 | MavCmd.TASK_RELEASE
                 | MavCmd.DO_CHANGE_SPEED
-            ) as number:
-                task_id = self._control.act(asked, now=now)
-                repeats = number == MavCmd.TASK_MODIFY and asked.command.params[1] in REPETITION
-                if repeats:  # a crash must not leave a task that runs once
-                    words = f"task {task_id}: not stored in time that it repeats: send it again"
-                    self._submissions.answer_once_durable(asked, TaskId(task_id), words, now=now)
-                else:
-                    asked.answer(MavResult.ACCEPTED, task_id)
+            ):
+                asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
+            case MavCmd.TASK_MODIFY:
+                task_id, undo = self._control.modify(asked, now=now)
+                self._submissions.answer_once_durable(
+                    asked, task_id, NOT_CHANGED, undo=undo, now=now
+                )
             case MavCmd.NAV_TAKEOFF if claims:  # examples for every kind of vehicle send it
                 asked.answer(MavResult.ACCEPTED)
             case MavCmd.NAV_LAND if claims:

@@ -1,5 +1,6 @@
 """Submissions of tasks: deduplicated, queued, and acknowledged once durable."""
 
+from collections import defaultdict
 from collections.abc import Hashable
 from functools import partial
 
@@ -70,6 +71,9 @@ class Submissions:
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         #: by task that is not durable yet: requests to answer, one for each client and command
         self._undecided: dict[TaskId, list[CommandRequest]] = {}
+        #: by vehicle: requests that have changed something which is not durable yet, in their
+        #: order, with why each is refused if it is not in time, and how it is undone
+        self._changes: dict[int, dict[CommandRequest, tuple[str, Effect]]] = defaultdict(dict)
         self.store_is_away = False  #: until something is committed: no new submissions
         self._is_closing = False
 
@@ -169,21 +173,27 @@ class Submissions:
         words: str,
         *,
         now: float,
-        undo: Effect = leave_it,
+        undo: Effect,
         then: Effect = leave_it,
     ) -> None:
         """Accept a request once what it has changed is durable, else undo it; ``words``: why.
 
-        ``then``: what else is done once it is accepted.
+        With it all later changes of its vehicle are undone, the last one first: they began with
+        what it had changed, and one may be its copy. ``then``: what else is done once accepted.
         """
+        changes = self._changes[asked.rover]
+        changes[asked] = words, undo
 
         def accept(*, now: float) -> None:
-            asked.answer(MavResult.ACCEPTED, task_id)
-            then(now=now)
+            if changes.pop(asked, None) is not None:
+                asked.answer(MavResult.ACCEPTED, task_id)
+                then(now=now)
 
         def give_up(*, now: float) -> None:
-            undo(now=now)
-            self._registry.record(asked.refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now))
+            while asked in changes:
+                last, (why, undo_last) = changes.popitem()
+                undo_last(now=now)
+                self._registry.record(last.refuse(Rejection(R.STORE_UNAVAILABLE, why), now=now))
 
         self.gate.hold(accept, give_up, now=now)
 

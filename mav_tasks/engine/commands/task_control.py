@@ -3,7 +3,8 @@
 Each returns the id of the task that it acted on, 0 for none or many, or raises Rejection.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import partial
 
 from mav_tasks.basics.errors import Rejection
 from mav_tasks.basics.latest import keep_latest
@@ -12,12 +13,14 @@ from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.services.commands import COPIED, REPEATED, Command
+from mav_tasks.engine.timers import Effect
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.kinds.params import flag, identifier, number, whole
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
+from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
@@ -47,8 +50,6 @@ class TaskControl:
                 return self._cancel(asked, now=now)
             case MavCmd.TASK_CLEAR:
                 return self._clear(asked, now=now)
-            case MavCmd.TASK_MODIFY:
-                return self._modify(asked, now=now)
             case MavCmd.TASK_RELEASE:
                 return self._release(asked, now=now)
             case _:
@@ -93,15 +94,23 @@ class TaskControl:
         if asked.client.is_late and task.state is TaskState.HELD:  # other tasks would start
             words = f"delayed by the server; task {task.id} is held now: cancel it again"
             raise Rejection(R.STALE, words)
-        if is_series and task.state in TERMINAL:  # between two runs
-            self._registry.repeat_no_more(task.id, actor=asked.actor, now=now)
-            return task.id
         if is_series:
-            terms = replace(task.terms, repeat="")
-            asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
-            task = self._registry[task.id]
-        asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
+            self._cancel_series(asked, task, kill=kill, actor=asked.actor, now=now)
+        else:
+            asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id
+
+    def _cancel_series(
+        self, asked: CommandRequest, task: Task, *, kill: bool, actor: str, now: float
+    ) -> None:
+        """Cancel the present run of a series, and let no further one follow."""
+        if task.state in TERMINAL:  # between two runs
+            self._registry.repeat_no_more(task.id, actor=actor, now=now)
+            return
+        terms = replace(task.terms, repeat="")
+        asked.vehicle.tasks.modify(task, terms, actor=actor, now=now)
+        task = self._registry[task.id]
+        asked.vehicle.joint.cancel(task, kill=kill, actor=actor, now=now)
 
     def _run_of(self, task_id: int) -> int:
         """Return the present run of a series, or the last one, by the id of any of its runs."""
@@ -143,7 +152,8 @@ class TaskControl:
             )
         return task.id
 
-    def _modify(self, asked: CommandRequest, *, now: float) -> int:
+    def modify(self, asked: CommandRequest, *, now: float) -> tuple[TaskId, Effect]:
+        """Execute TASK_MODIFY; return the task's id, and what undoes the change."""
         task = self._find(asked, identifier(asked.command, 1, "task", low=1, default=None))
         asked.rights.require_own(task, asked.submitter, "modify")
         room = asked.vehicle.tasks.room
@@ -153,7 +163,32 @@ class TaskControl:
             terms = _modified(task, asked.command, room, now=now)
         asked.rights.check_terms(terms, before=task.terms)
         asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
-        return task.id
+        return task.id, partial(self._undo, asked, task, terms)
+
+    def _undo(self, asked: CommandRequest, before: Task, after: Terms, *, now: float) -> None:
+        """Undo a modification, but no term that something else has changed since.
+
+        What repeats by it may have ended meanwhile: then its next run waits.
+        """
+        task = self._registry.get(self._registry.run_of(after.series) or before.id)
+        if task is None:
+            return
+        is_over, old = task.id != before.id or task.state in TERMINAL, before.terms
+        names = ["repeat"] if is_over else [field.name for field in fields(Terms)]
+        terms = {
+            name: getattr(old, name)
+            for name in names
+            if getattr(old, name) != getattr(after, name) == getattr(task.terms, name)
+        }
+        if is_over and terms == {"repeat": ""}:
+            self._cancel_series(asked, task, kill=False, actor=SERVER, now=now)
+            return
+        try:
+            asked.vehicle.tasks.modify(task, replace(task.terms, **terms), actor=SERVER, now=now)
+        except Rejection:  # what it ran after has failed meanwhile
+            asked.vehicle.joint.cancel(
+                task, kill=False, reason=R.DEPENDENCY_FAILED, actor=SERVER, now=now
+            )
 
     def _with_piece(self, task: Task, command: Command, times: Times, *, now: float) -> Terms:
         """Return a task's terms with a piece of its repetition; unchanged until all have come."""
