@@ -21,6 +21,10 @@ class Effect(Protocol):
     def __call__(self, *, now: float) -> None: ...
 
 
+def leave_it(*, now: float) -> None:
+    """Do nothing: the effect of what needs none."""
+
+
 class Turn(IntEnum):
     """The order of timers that are due at one moment: what halts a rover comes first."""
 

@@ -96,7 +96,7 @@ class Lineup:
         self.uid = ""
         #: no person has disarmed it, or one has allowed arming since
         self.may_be_armed = True
-        self._speed: float | None = None  # m/s, of goals that name none; None: the settings' one
+        self.speed: float | None = None  #: m/s, of goals that name none; None: the settings' one
         self._cruise: float | None = None  # m/s, the vehicle's own cruise speed
         self._stop: tuple[float, float] | None = None  # m/s and m of a measured stop
         self._begun_at = 0.0
@@ -195,7 +195,7 @@ class Lineup:
 
     def _apply_driving(self) -> None:
         self.executor.apply(replace(self.settings, driving=self.driving))
-        self.executor.drive.cruise = self._cruise if self._speed is None else None
+        self.executor.drive.cruise = self._cruise if self.speed is None else None
 
     @property
     def driving(self) -> Driving:
@@ -203,7 +203,7 @@ class Lineup:
         driving = self.settings.driving
         if self._stop is not None:
             driving = replace(driving, acceleration=safe_braking(driving, *self._stop))
-        return driving if self._speed is None else replace(driving, speed=self._speed)
+        return driving if self.speed is None else replace(driving, speed=self.speed)
 
     def cruises(self, speed: float | None) -> None:
         """Note the vehicle's own cruise speed, m/s; None: unknown."""
@@ -239,12 +239,24 @@ class Lineup:
 
         Return the active task's id, or None.
         """
-        if speed != self._speed:
+        if speed != self.speed:
             self.registry.record(VehicleSpeedSet(self.vehicle, speed, actor, now))
-        self._speed = speed
+        self.speed = speed
         self._apply_driving()
         self.executor.set_speed(speed)
         return self.executor.task_id
+
+    def reset_speed(
+        self, active: Task | None, speed: float | None, *, instead_of: float | None, now: float
+    ) -> None:
+        """Undo ``set_speed``; ``active`` was the active task, which a plan may have set since."""
+        present = self.active
+        own = None if present is None else present.progress.speed
+        self.set_speed(speed, actor=SERVER, now=now)
+        if present is not None and own != instead_of:
+            self.executor.set_speed(own)
+        elif present is not None and active is not None and active.id == present.id:
+            self.executor.set_speed(active.progress.speed)
 
     # halts
 

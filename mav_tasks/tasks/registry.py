@@ -247,6 +247,10 @@ class TaskRegistry:
         item = _item_number(task, progress.step)
         self.record(TaskAdvanced(task_id, task.vehicle, task.version, progress, now, item))
 
+    def hold_back(self, task_id: TaskId) -> None:
+        """Let a task drive on only once all that is recorded so far is durable."""
+        self._last_event[task_id] = self.recorded
+
     def reached(self, task_id: TaskId, step: int, *, performs: bool, now: float) -> None:
         """Record that a step of a plan is done; ``performs``: it is sent to the vehicle."""
         task = self._tasks[task_id]
@@ -257,7 +261,7 @@ class TaskRegistry:
         """Record that an act is about to be told; it is when this is durable."""
         self.note_progress(task_id, progress)
         self.keep_progress(task_id, now=now)
-        self._last_event[task_id] = self.recorded
+        self.hold_back(task_id)
 
     def acts(self, task_id: TaskId, step: int, *, now: float) -> None:
         """Record that an act is told to the vehicle now."""

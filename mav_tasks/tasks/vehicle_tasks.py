@@ -61,7 +61,7 @@ class VehicleTasks(Lineup):
         by_somebody = last if last.reason in BY_SOMEBODY else NOBODY
         self.halts.restore(restored.halt_epochs.get(vehicle, 1), by_somebody, now=now)
         self.halt(R.RESTARTED, now=now)
-        self.paused, self._speed = paused, restored.speeds.get(vehicle)
+        self.paused, self.speed = paused, restored.speeds.get(vehicle)
         self.uid = restored.uids.get(vehicle, "")
         self.may_be_armed = vehicle not in restored.disarmed
         self._apply_driving()
@@ -202,9 +202,14 @@ class VehicleTasks(Lineup):
         """Continue, or start, an unfinished plan at another of its steps."""
         assert isinstance(task.goal, Plan), "only plans have steps"
         progress = skipped_to(task.goal, replace(self.registry[task.id].progress, pending=()), step)
+        self.go_on_at(task, progress, now=now)
+
+    def go_on_at(self, task: Task, progress: Progress, *, now: float) -> None:
+        """Continue, or start, an unfinished task at this progress, once that is durable."""
         if self.executor.task_id == task.id:
             self.executor.drive.forget()
         self.registry.advance(task.id, progress, now=now)
+        self.registry.hold_back(task.id)
 
     def rest(self, seen: VehicleView, *, now: float) -> None:
         """Record how far the vehicle rolled after it was stopped for the end of the server."""

@@ -185,3 +185,33 @@ def test_a_change_is_acknowledged_once_it_is_durable_else_undone(
     world.run(0.2)
     assert world.client.acks_of(54012)[2:] == [(ACCEPTED, 1)]
     assert world.task(1).terms != before
+
+
+PLAN = "; ".join(
+    ["mission", *(f"NAV_WAYPOINT at={each}" for each in ("0,0", "9,0", "9,9", "0,-9"))]
+)
+
+
+@for_each("words", ["DO_CHANGE_SPEED 1 0.1", "DO_SET_MISSION_CURRENT 3 to=autopilot"])
+def test_a_refused_change_drives_nothing(world: World, store: LateStore, words: str) -> None:
+    ask(world, PLAN)
+    world.run(1)
+    ask(world, "MISSION_START")
+    world.until_faster(0.4)
+    store.delay = inf
+    ask(world, words)
+    world.run(0.2)
+    ask(world, words)  # it repeats it
+    world.run(0.3)
+    assert world.truth.forward_speed < 0.25  # slower at once, or not to another item
+    assert world.client.texts()[-2:] == ["not stored in time: nothing changed"] * 2
+    store.delay = 0.0
+    world.until_faster(0.4)
+    assert world.truth.north > 0.3
+    assert abs(world.truth.east) < 0.1
+    store.delay, answered = 0.2, len(world.client.acks)
+    ask(world, words)
+    world.run(0.15)
+    assert len(world.client.acks) == answered
+    world.run(0.1)
+    assert world.client.acks[-1].result == ACCEPTED

@@ -18,12 +18,13 @@ from mav_tasks.engine.commands.command_request import CommandRequest, halts_agai
 from mav_tasks.engine.commands.forwarding import check_relay, relay
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
-from mav_tasks.engine.commands.submissions import Submissions, leave_it
+from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
 from mav_tasks.engine.services.commands import COPIED, Answer, Command
+from mav_tasks.engine.timers import leave_it
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.kinds.commands import PARSERS
 from mav_tasks.kinds.params import bad, has_place, whole
@@ -175,15 +176,10 @@ class Commands:
                 self._reposition(asked, now=now)
             case number if number in PARSERS and (claims or is_task_command(number)):
                 self._submissions.submit(asked, now=now)
-            case (
-                MavCmd.TASK_CANCEL
-                | MavCmd.TASK_CLEAR
-                | MavCmd.TASK_RELEASE
-                | MavCmd.DO_CHANGE_SPEED
-            ):
+            case MavCmd.TASK_CANCEL | MavCmd.TASK_CLEAR | MavCmd.TASK_RELEASE:
                 asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
-            case MavCmd.TASK_MODIFY:
-                task_id, undo = self._control.modify(asked, now=now)
+            case MavCmd.TASK_MODIFY | MavCmd.DO_CHANGE_SPEED:
+                task_id, undo = self._control.change(asked, now=now)
                 self._submissions.answer_once_durable(
                     asked, task_id, NOT_CHANGED, undo=undo, now=now
                 )
@@ -201,10 +197,19 @@ class Commands:
             case MavCmd.DO_SET_MISSION_CURRENT if claims:
                 self._plans.check_start(asked.rights, vehicle, asked.submitter)
                 seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
-                task = self._plans.go_on_with(vehicle, seq, now=now)
-                asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
+                undo = self._plans.undo_of_jump(vehicle)
+                task, then = self._plans.go_on_with(vehicle, seq, now=now), leave_it
                 if task is None:
-                    asked.tell(self._plans.begins_with(vehicle, seq), MavSeverity.INFO, now=now)
+                    begins = self._plans.begins_with(vehicle, seq)
+                    then = partial(asked.tell, begins, MavSeverity.INFO)
+                self._submissions.answer_once_durable(
+                    asked,
+                    TaskId(task.id if task else 0),
+                    NOT_CHANGED,
+                    undo=undo,
+                    then=then,
+                    now=now,
+                )
             case MavCmd.DO_PAUSE_CONTINUE:
                 asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
             case MavCmd.SET_MESSAGE_INTERVAL:

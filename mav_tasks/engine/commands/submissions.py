@@ -21,7 +21,7 @@ from mav_tasks.engine.commands.ordering import (
 from mav_tasks.engine.commands.translate import IN_FORCE, result_of
 from mav_tasks.engine.commit_gate import CommitGate, DependencyQuestions
 from mav_tasks.engine.policy import TASK_COMMANDS
-from mav_tasks.engine.timers import Effect, Timers
+from mav_tasks.engine.timers import Effect, Timers, leave_it
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -44,10 +44,6 @@ PAUSED = {
 }
 GIVEN_UP = 3.5  # s, after which a client has stopped waiting for an answer
 NONCE = 3  # its index among the parameters
-
-
-def leave_it(*, now: float) -> None:
-    """Do nothing about what was not stored in time."""
 
 
 class Submissions:

@@ -13,7 +13,7 @@ from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.services.commands import COPIED, REPEATED, Command
-from mav_tasks.engine.timers import Effect
+from mav_tasks.engine.timers import Effect, leave_it
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.kinds.params import flag, identifier, number, whole
 from mav_tasks.mavlink.address import Address
@@ -50,10 +50,14 @@ class TaskControl:
                 return self._cancel(asked, now=now)
             case MavCmd.TASK_CLEAR:
                 return self._clear(asked, now=now)
-            case MavCmd.TASK_RELEASE:
-                return self._release(asked, now=now)
             case _:
-                return self._change_speed(asked, now=now)
+                return self._release(asked, now=now)
+
+    def change(self, asked: CommandRequest, *, now: float) -> tuple[TaskId, Effect]:
+        """Execute TASK_MODIFY or DO_CHANGE_SPEED; return the task's id, and what undoes it."""
+        if asked.command.command == MavCmd.TASK_MODIFY:
+            return self._modify(asked, now=now)
+        return self._change_speed(asked, now=now)
 
     def cancel_latest(
         self, client: GcsClient, vehicle: Vehicle, source: Address, command: int, *, now: float
@@ -152,8 +156,7 @@ class TaskControl:
             )
         return task.id
 
-    def modify(self, asked: CommandRequest, *, now: float) -> tuple[TaskId, Effect]:
-        """Execute TASK_MODIFY; return the task's id, and what undoes the change."""
+    def _modify(self, asked: CommandRequest, *, now: float) -> tuple[TaskId, Effect]:
         task = self._find(asked, identifier(asked.command, 1, "task", low=1, default=None))
         asked.rights.require_own(task, asked.submitter, "modify")
         room = asked.vehicle.tasks.room
@@ -163,9 +166,11 @@ class TaskControl:
             terms = _modified(task, asked.command, room, now=now)
         asked.rights.check_terms(terms, before=task.terms)
         asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
-        return task.id, partial(self._undo, asked, task, terms)
+        return task.id, partial(self._not_modified, asked, task, terms)
 
-    def _undo(self, asked: CommandRequest, before: Task, after: Terms, *, now: float) -> None:
+    def _not_modified(
+        self, asked: CommandRequest, before: Task, after: Terms, *, now: float
+    ) -> None:
         """Undo a modification, but no term that something else has changed since.
 
         What repeats by it may have ended meanwhile: then its next run waits.
@@ -200,14 +205,16 @@ class TaskControl:
             return task.terms
         return _repeating(task, text, times, now=now)
 
-    def _change_speed(self, asked: CommandRequest, *, now: float) -> int:
+    def _change_speed(self, asked: CommandRequest, *, now: float) -> tuple[TaskId, Effect]:
         whole(asked.command, 1, "speed type", high=GROUND_OR_AIR)
         wish = asked.command.params[1]
         if wish == NO_CHANGE:
-            return 0
+            return TaskId(0), leave_it
         top = min(asked.vehicle.parts.settings.driving.max_speed, asked.rights.limits.max_speed)
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
-        return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
+        tasks = asked.vehicle.tasks
+        undo = partial(tasks.reset_speed, tasks.active, tasks.speed, instead_of=speed)
+        return tasks.set_speed(speed, actor=asked.actor, now=now) or TaskId(0), undo
 
     def _find(self, asked: CommandRequest, task_id: int, *, may_be_over: bool = False) -> Task:
         task = self._registry.get(task_id)

@@ -13,6 +13,7 @@ from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.missions.plan_items import fence_of, place_of, plan_of, steps_of
 from mav_tasks.engine.missions.plan_table import MissionParseOptions
 from mav_tasks.engine.services.missions import count_of, unpacked
+from mav_tasks.engine.timers import Effect
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
@@ -141,6 +142,25 @@ class Plans:
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
         """Let the next start begin at this item; 0 is the first."""
         self._first[vehicle.system_id] = first
+
+    def undo_of_jump(self, vehicle: Vehicle) -> Effect:
+        """Return what undoes the jump that comes next, if it is not stored in time."""
+        going, chosen = self._going(vehicle), self._first.get(vehicle.system_id)
+
+        def undo(*, now: float) -> None:
+            if going is not None:
+                self._go_back(vehicle, going[0], now=now)
+            elif chosen is None:
+                self._first.pop(vehicle.system_id, None)
+            else:
+                self.begin_at(vehicle, chosen)
+
+        return undo
+
+    def _go_back(self, vehicle: Vehicle, before: Task, *, now: float) -> None:
+        task = self._registry.get(before.id)
+        if task is not None and task.state not in TERMINAL:
+            vehicle.tasks.go_on_at(task, before.progress, now=now)
 
     # starting and jumping
 
