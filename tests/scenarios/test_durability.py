@@ -215,3 +215,29 @@ def test_a_refused_change_drives_nothing(world: World, store: LateStore, words: 
     assert len(world.client.acks) == answered
     world.run(0.1)
     assert world.client.acks[-1].result == ACCEPTED
+
+
+@for_each("halt", ["pause", "delay"])
+def test_a_refused_start_lets_nothing_go(world: World, store: LateStore, halt: str) -> None:
+    ask(world, PLAN)
+    world.run(1)
+    ask(world, "MISSION_START")
+    world.until_faster(0.3)
+    if halt == "pause":
+        world.client.pause()
+    else:
+        world.observer.expects_gaps = True
+        world.suspend_server(2.0)
+    world.run(4)
+    assert world.state(1)[0] is (S.PAUSED if halt == "pause" else S.HELD)
+    store.delay = inf
+    world.client.command(300, 3)
+    world.run(1)
+    assert world.client.said("not stored in time: not started")
+    store.delay = 0.0
+    world.run(4)
+    assert (world.states(), world.paused()) == ([S.PAUSED], R.OPERATOR)
+    assert world.task(1).progress.step == 1
+    assert world.stands()
+    ask(world, "MISSION_START")
+    world.until_faster(0.3)

@@ -111,11 +111,11 @@ class ModeRequests:
             task = self._submissions.submit_draft(asked, started, now=now)
             self._plans.restarted(vehicle, task, now=now)
         else:
-            undo = partial(self._plans.stage_again, vehicle, started)
+            task, undo = started
             words = "not stored in time: not started"
-            then = partial(give_back, asked, started.id)
+            then = partial(give_back, asked, task.id)
             self._submissions.answer_once_durable(
-                asked, started.id, words, undo=undo, then=then, now=now
+                asked, task.id, words, undo=undo, then=then, now=now
             )
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:

@@ -5,6 +5,7 @@ started again after its end, it becomes a new task.
 """
 
 from dataclasses import replace
+from functools import partial
 from math import inf
 from typing import NamedTuple
 
@@ -57,6 +58,15 @@ class Stored(NamedTuple):
 
 
 NOTHING = Stored(0, "")
+
+
+class Started(NamedTuple):
+    """A task that was started or resumed, and what undoes that if it is not stored in time."""
+
+    task: Task
+    undo: Effect
+
+
 #: active, but not being driven: a stock autopilot, too, clears a mission in HOLD
 AT_REST = frozenset({S.PAUSED, S.HELD})
 CALLED_OFF = TERMINAL - {S.COMPLETED}
@@ -177,10 +187,10 @@ class Plans:
 
     def start(
         self, vehicle: Vehicle, submitter: Submitter, *, first: int, now: float
-    ) -> Task | Draft:
+    ) -> Started | Draft:
         """Start or resume the staged mission; or resume an active plan, if no staged one is new.
 
-        Return the task; or, if it is over, the draft of a new one: submit that, then call
+        Return it; or, if it is over, the draft of a new task: submit that, then call
         ``restarted``. Raise Rejection if there is nothing to start, or it must not start now.
         """
         if vehicle.tasks.is_stopped:
@@ -188,11 +198,12 @@ class Plans:
         vehicle.parts.check_not_manual(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
         active, task = vehicle.tasks.active, self.task(vehicle)
+        undo = partial(self._not_started, vehicle, vehicle.tasks.paused)
         is_fresh = task is not None and task.state in WAITING and task.terms.is_staged
         is_other = active and active.id != stored.plan_id and isinstance(active.goal, Plan)
         if active and is_other and not is_fresh:
             self._set_going(vehicle, active, submitter, now=now)
-            return active
+            return Started(active, partial(undo, active))
         _check_state(task)
         count = count_of(stored.source)
         if not count:
@@ -204,7 +215,7 @@ class Plans:
             # repeated, perhaps in another way: it is the start that was just requested
             by, task_id, at = self._started.get(vehicle.system_id, (None, 0, -inf))
             if (by, task_id) == (submitter, task.id) and now - at <= STARTED_TWICE:
-                return task
+                return Started(task, partial(undo, task))
         chosen = self._first.pop(vehicle.system_id, 0)
         first = first or chosen
         if task is None or task.state in TERMINAL:
@@ -212,7 +223,7 @@ class Plans:
         if first:
             vehicle.tasks.skip_to(task, first, now=now)
         self._set_going(vehicle, self._registry[task.id], submitter, now=now)
-        return task
+        return Started(task, partial(undo, task, has_jumped=bool(first)))
 
     def _set_going(self, vehicle: Vehicle, task: Task, by: Submitter, *, now: float) -> None:
         """Resume an active mission and its queue; start a waiting one, even in a paused queue.
@@ -236,13 +247,29 @@ class Plans:
             joint.give_way_to(task, actor=actor, now=now)
         joint.wake(now=now)
 
-    def stage_again(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
-        """Undo a start that was not stored in time."""
-        current = self._registry.get(task.id)
+    def _not_started(
+        self,
+        vehicle: Vehicle,
+        paused: TaskReason,
+        before: Task,
+        *,
+        has_jumped: bool = False,
+        now: float,
+    ) -> None:
+        """Undo a start: what it let go stands again, and the queue is paused as before."""
+        was_at_rest = before.state is S.HELD or before.terms.is_staged
+        was_at_rest |= before.state is S.PAUSED and bool(paused)
         self._started.pop(vehicle.system_id, None)
-        if current is not None and current.state in WAITING:
-            terms = replace(current.terms, is_staged=True)
-            vehicle.tasks.modify(current, terms, actor=SERVER, now=now)
+        if has_jumped:
+            self._go_back(vehicle, before, now=now)
+        tasks, task = vehicle.tasks, self._registry.get(before.id)
+        if task is not None and task.state in WAITING and before.terms.is_staged:
+            terms = replace(task.terms, is_staged=True)
+            tasks.modify(task, terms, actor=SERVER, now=now)
+        elif task is not None and task == tasks.active and was_at_rest:
+            vehicle.joint.pause(actor=SERVER, now=now)
+        if paused and not tasks.paused:
+            tasks.pause_queue(paused, now=now)
 
     def restarted(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """Start a mission that was submitted again; its plan id becomes the new task's id."""
