@@ -19,10 +19,10 @@ from tests.kit.client import (
     Sent,
 )
 from tests.kit.rows import SHORT, ask, check
-from tests.kit.world import World
+from tests.kit.world import World, put_home
 from tests.scenarios.conftest import MakeWorld
 
-MODIFY, PRIORITY, CHANGE_SPEED = 54012, 1, 178
+MODIFY, PRIORITY, CHANGE_SPEED, RELEASE = 54012, 1, 178, 54013
 OBSERVER, SUBMITTER, OTHER, OPERATOR = 9, 10, 11, 12  # system ids
 PEOPLE = {"submitter": SUBMITTER, "other": OTHER, "operator": OPERATOR}
 ZEROS = SHORT["ZEROS"]
@@ -294,6 +294,40 @@ def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str
     world.run(3)
     assert world.observer.sent_since(at) == []
     assert world.mode() is Mode.MANUAL
+
+
+@for_each("how", ["MISSION_START to=autopilot", "DO_SET_MODE 1 10 to=autopilot"])
+@for_each("has_it", ["a person", "a held task"])
+def test_a_submitters_mission_takes_the_rover_from_nobody(
+    with_roles: MakeRoles, how: str, has_it: str
+) -> None:
+    world = with_roles()
+    submitter = join(world, SUBMITTER)
+    ask(world, "mission; NAV_WAYPOINT at=0,0; NAV_WAYPOINT at=9,9", submitter)
+    world.run(1)
+    if has_it == "a person":
+        put_home(world, -20, 0)
+        world.operator_mode(Mode.HOLD)
+        world.operator_arm(True)
+        world.operator_mode(Mode.RTL)
+    else:
+        world.observer.expects_gaps = True
+        active(world, 5.0)
+        world.suspend_server(3.0)
+    world.run(4)
+    at = world.now
+    check(world, f"submitter> {how} : ACCEPTED #1", submitter=submitter)
+    world.run(4)
+    assert world.state(1)[0] is S.QUEUED
+    assert (world.paused(), "move" in world.observer.sent_since(at)) == (R.NONE, False)
+    if has_it == "a person":
+        assert world.mode() is Mode.RTL
+        world.operator_mode(Mode.HOLD)
+        world.run(3)
+        world.client.proceed()
+    else:
+        world.client.command(RELEASE, 2, 2)
+    world.until_state(1, S.EXECUTING)
 
 
 def test_what_bounds_a_rover_is_of_safety_alone(with_roles: MakeRoles) -> None:

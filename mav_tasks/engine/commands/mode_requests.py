@@ -106,10 +106,10 @@ class ModeRequests:
         self._plans.check_start(asked.rights, vehicle, submitter)
         self._submissions.check_open()
         vehicle.joint.end_driving_of(asked.client.key, now=now)
-        started = self._plans.start(vehicle, submitter, first=first, now=now)
+        started = self._plans.start(asked.rights, vehicle, submitter, first=first, now=now)
         if isinstance(started, Draft):
             task = self._submissions.submit_draft(asked, started, now=now)
-            self._plans.restarted(vehicle, task, now=now)
+            self._plans.restarted(asked.rights, vehicle, task, now=now)
         else:
             task, undo = started
             words = "not stored in time: not started"
@@ -140,10 +140,10 @@ class ModeRequests:
         self, vehicle: Vehicle, submitter: Submitter, rights: Rights, *, now: float
     ) -> None:
         self._submissions.check_open()
-        started = self._plans.start(vehicle, submitter, first=0, now=now)
+        started = self._plans.start(rights, vehicle, submitter, first=0, now=now)
         if isinstance(started, Draft):
             task = self._submissions.take_in(rights, vehicle, started, now=now)
-            self._plans.restarted(vehicle, task, now=now)
+            self._plans.restarted(rights, vehicle, task, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
     def _mark(self, asked: CommandRequest, *, now: float) -> None:

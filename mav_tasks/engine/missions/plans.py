@@ -186,7 +186,7 @@ class Plans:
                 rights.require_own(task, submitter, "start that plan")
 
     def start(
-        self, vehicle: Vehicle, submitter: Submitter, *, first: int, now: float
+        self, rights: Rights, vehicle: Vehicle, submitter: Submitter, *, first: int, now: float
     ) -> Started | Draft:
         """Start or resume the staged mission; or resume an active plan, if no staged one is new.
 
@@ -202,7 +202,7 @@ class Plans:
         is_fresh = task is not None and task.state in WAITING and task.terms.is_staged
         is_other = active and active.id != stored.plan_id and isinstance(active.goal, Plan)
         if active and is_other and not is_fresh:
-            self._set_going(vehicle, active, submitter, now=now)
+            self._set_going(rights, vehicle, active, submitter, now=now)
             return Started(active, partial(undo, active))
         _check_state(task)
         count = count_of(stored.source)
@@ -222,28 +222,32 @@ class Plans:
             return self._again(vehicle, stored, submitter, first=first, now=now)
         if first:
             vehicle.tasks.skip_to(task, first, now=now)
-        self._set_going(vehicle, self._registry[task.id], submitter, now=now)
+        self._set_going(rights, vehicle, self._registry[task.id], submitter, now=now)
         return Started(task, partial(undo, task, has_jumped=bool(first)))
 
-    def _set_going(self, vehicle: Vehicle, task: Task, by: Submitter, *, now: float) -> None:
+    def _set_going(
+        self, rights: Rights, vehicle: Vehicle, task: Task, by: Submitter, *, now: float
+    ) -> None:
         """Resume an active mission and its queue; start a waiting one, even in a paused queue.
 
-        A held one drives its remainder: who starts it has decided that it goes on.
+        A held one drives its remainder: who starts it has decided that it goes on. One that a
+        submitter starts waits as its other tasks do: it takes the vehicle from nobody.
         """
         joint, tasks, actor = vehicle.joint, vehicle.tasks, str(by)
+        may_resume = rights.reach(OPERATOR)
         _check_state(task)
         self._started[vehicle.system_id] = by, task.id, now
         if task.state is S.HELD:
-            joint.release(task, again=False, may_continue=True, actor=actor, now=now)
+            joint.release(task, again=False, may_continue=may_resume, actor=actor, now=now)
         if task == tasks.active or task.state is S.HELD:
-            if task.state is not S.HELD or tasks.paused:
+            if may_resume and (task.state is not S.HELD or tasks.paused):
                 joint.go_on(actor=actor, now=now)
             return
         if is_of_autopilot(task):
             self.end_replaced(vehicle, is_started=True, actor=actor, now=now)
         if task.terms.is_staged:
             tasks.modify(task, replace(task.terms, is_staged=False), actor=actor, now=now)
-        if tasks.paused or tasks.is_held_ahead or joint.state(now=now).is_led:
+        if may_resume and (tasks.paused or tasks.is_held_ahead or joint.state(now=now).is_led):
             joint.give_way_to(task, actor=actor, now=now)
         joint.wake(now=now)
 
@@ -271,11 +275,11 @@ class Plans:
         if paused and not tasks.paused:
             tasks.pause_queue(paused, now=now)
 
-    def restarted(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
+    def restarted(self, rights: Rights, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """Start a mission that was submitted again; its plan id becomes the new task's id."""
         stored = self.stored(vehicle.system_id, MISSION)._replace(plan_id=task.id)
         self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
-        self._set_going(vehicle, task, task.submitter, now=now)
+        self._set_going(rights, vehicle, task, task.submitter, now=now)
 
     def _again(
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
