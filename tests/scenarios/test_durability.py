@@ -241,3 +241,17 @@ def test_a_refused_start_lets_nothing_go(world: World, store: LateStore, halt: s
     assert world.stands()
     ask(world, "MISSION_START")
     world.until_faster(0.3)
+
+
+def test_what_repeats_by_a_refused_change_has_no_further_run(
+    world: World, store: LateStore
+) -> None:
+    world.client.command(54000, 1, 0, 0, 1, 0, 8, 5)
+    world.run(0.1)
+    store.delay = inf
+    ask(world, "TASK_MODIFY 1 9 15")
+    ask(world, "TASK_CANCEL 1")
+    world.run(0.1)
+    assert world.states() == [S.CANCELLED, S.SCHEDULED]  # the next run
+    world.run(0.5)
+    assert world.states() == [S.CANCELLED, S.CANCELLED]
