@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.config.settings import Limits, Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
-from tests.kit.client import ACCEPTED, Sent
+from tests.kit.client import ACCEPTED, Sent, heartbeat, packed
 from tests.kit.gateways.engines import FleetWorld
 from tests.kit.gateways.order import early_starts
 from tests.kit.mission import Item, Upload
@@ -20,13 +21,16 @@ WITHIN = 1.0  # s for the answer of the database
 MOVE, MODIFY = 54000, 54012
 RUN_AFTER = 4
 A, B = 1, 2  # the rovers; a has the one, b the other
+SLOW = Settings(
+    roles=Roles(addresses={"200/190": "submitter"}, submitter=Limits(max_speed=0.1)),
+)
 
 
 class Pair(FleetWorld):
     """Gateways a and b with a rover each, which the other one does not hear."""
 
     def __init__(self, folder: Path) -> None:
-        super().__init__(folder, rovers=2)
+        super().__init__(folder, rovers=2, settings=SLOW)
         self.a, self.b = self.gateways["server"], self.gateways["b"]
         self.cut("server", B)
         self.cut("b", A)
@@ -86,6 +90,23 @@ def test_a_task_for_any_rover_and_a_plan_wait_for_the_answer(pair: Pair) -> None
     pair.b.notified()
     pair.run(0.5)
     assert (sent.result, plan.result) == (ACCEPTED, 0)
+
+
+def test_a_plan_that_waits_has_the_rights_of_its_client(pair: Pair) -> None:
+    first = pair.submit(A)
+    slow = pair.add_client("slow", system_id=200, server="b:clients")
+    pair.run(0.1)
+    pair.b.is_looking = False
+    items = [Item(16, **at(1, 3)), Item(54014, param4=first, frame=2)]
+    plan = Upload(slow, items, target=(B, 191))
+    pair.run(0.2)
+    slow.send_raw(packed(heartbeat(), 254, 190, seq=7))  # an operator's, from the same endpoint
+    pair.run(0.1)
+    pair.b.is_looking = True
+    pair.b.notified()
+    pair.run(0.5)
+    task = pair.task(plan.opaque_id)
+    assert (task.terms.top_speed, task.submitter.system_id) == (0.1, 200)
 
 
 def test_a_halt_that_comes_before_the_answer_of_the_database_counts(pair: Pair) -> None:

@@ -57,7 +57,7 @@ from mav_tasks.tasks.deduplicator import reused
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import Plan, Step, number_of
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason, TaskState
-from mav_tasks.tasks.task import ANY, Draft, Marks, Submitter
+from mav_tasks.tasks.task import ANY, Draft, Marks
 
 
 class GuidedItemRequest(CommandRequest):
@@ -127,13 +127,13 @@ class PlanTransfer(Transfer):
                 client.rights.require(row.role, f"do this ({row.about})")
             match message:
                 case m.MissionCount():
-                    self.begin(message, sender, rank=client.rights.rank, now=now)
+                    self.begin(message, sender, client=client, now=now)
                 case m.MissionAck():
                     self.end(message, sender, now=now)
                 case m.MissionItem() | m.MissionItemInt() if is_go_to:
                     self._go_to(client, packet, message, now=now)
                 case m.MissionItem() | m.MissionItemInt():
-                    self.take(message, sender, now=now)
+                    self.take(message, sender, client=client, now=now)
                 case m.MissionRequestList():
                     self.offer(sender, now=now)
                 case m.MissionRequest() | m.MissionRequestInt():
@@ -237,14 +237,14 @@ class PlanTransfer(Transfer):
             task = self.parts.plans.task(self._vehicle)
             if task is not None and task.state in ACTIVE:
                 raise Rejection(R.NOT_ALLOWED, f"task {task.id} has started: cancel it first")
-            self._check_own(client, client.submitter(sender.address))
+            self._check_own(upload)
         self._store([self.kind], items, sender, self.finish, now=now)
 
-    def _check_own(self, client: GcsClient, submitter: Submitter) -> None:
-        """Raise Rejection if a client may not replace, or remove, the staged mission."""
+    def _check_own(self, upload: Upload) -> None:
+        """Raise Rejection if an upload may not replace, or remove, the staged mission."""
         task = self.parts.plans.task(self._vehicle)
         if task is not None and task.state not in TERMINAL:
-            client.rights.require_own(task, submitter, "replace that plan")
+            upload.rights.require_own(task, upload.submitter, "replace that plan")
 
     def _submit(self, client: GcsClient, upload: Upload, *, now: float) -> None:
         """Submit a mission as a task, staged or queued."""
@@ -256,14 +256,14 @@ class PlanTransfer(Transfer):
             ANY if vehicle is None else vehicle.system_id,
             MavCmd.MISSION_START,
             plan,
-            client.submitter(address),
+            upload.submitter,
             replace(terms, is_staged=is_staged, is_cruising=is_staged),
             Marks(  # two of one content differ by their nonces
                 0 if is_staged else nonce,
                 blake2b(f"{self.address} {plan.source}".encode(), digest_size=9).hexdigest(),
             ),
         )
-        client.rights.check_content(draft)
+        upload.rights.check_content(draft)
         if not is_staged:
             # a long plan may come again later than submissions are remembered
             known = submissions.known_plan(draft, begun_at=upload.begun_at, now=now)
@@ -286,8 +286,8 @@ class PlanTransfer(Transfer):
             raise Rejection(R.STALE, f"{halts.words} came during the upload: upload it again")
         before, actor = plans.stored(vehicle.system_id, MISSION), str(address)
         if is_staged:
-            self._check_own(client, draft.submitter)
-        task = submissions.submit_plan(client.rights, vehicle, draft, now=now)
+            self._check_own(upload)
+        task = submissions.submit_plan(upload.rights, vehicle, draft, now=now)
         if is_staged:
             plans.keep(vehicle, MISSION, Stored(task.id, plan.source), actor=actor, now=now)
 

@@ -15,6 +15,7 @@ from mav_tasks.basics.latest import keep_latest
 from mav_tasks.config.settings import Settings
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.commands.assignments import Assignments
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.inputs import Place
@@ -42,7 +43,7 @@ from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import Step
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import ANY
+from mav_tasks.tasks.task import ANY, Submitter
 
 R = TaskReason
 
@@ -118,7 +119,9 @@ class Upload:
     """An upload under way."""
 
     sender: Sender
-    rank: int
+    #: the latest item's: later the endpoint may send for somebody else
+    rights: Rights
+    submitter: Submitter
     count: int
     counted_at: float
     over_at: float
@@ -260,7 +263,9 @@ class Transfer:
 
     # uploads
 
-    def begin(self, message: m.MissionCount, sender: Sender, *, rank: int, now: float) -> None:
+    def begin(
+        self, message: m.MissionCount, sender: Sender, *, client: GcsClient, now: float
+    ) -> None:
         """A client begins an upload, or begins it again; of a higher rank also instead of another.
 
         One that begins again gets no more time by that. Raise Rejection if it is refused.
@@ -280,7 +285,7 @@ class Transfer:
                 # never items of one upload with those of another.
                 over_at = upload.over_at
                 self._leave(upload, now=now)
-            elif upload.is_whole or (upload.rank >= rank and not is_gone):
+            elif upload.is_whole or (upload.rights.rank >= client.rights.rank and not is_gone):
                 raise Rejection(R.WRONG_STATE, TAKEN)
             elif is_gone:  # it keeps nobody out
                 self._leave(upload, now=now)
@@ -293,7 +298,8 @@ class Transfer:
             before = _Past()
         self.upload = Upload(
             sender,
-            rank,
+            client.rights,
+            client.who,
             message.count,
             counted_at=now,
             over_at=over_at,
@@ -306,7 +312,12 @@ class Transfer:
         self._advance(self.upload, now=now)
 
     def take(
-        self, message: m.MissionItemInt | m.MissionItem, sender: Sender, *, now: float
+        self,
+        message: m.MissionItemInt | m.MissionItem,
+        sender: Sender,
+        *,
+        client: GcsClient,
+        now: float,
     ) -> None:
         """Take an item; one of no upload changes nothing."""
         upload, seq, item = self.upload, message.seq, item_of(message)
@@ -331,6 +342,7 @@ class Transfer:
             self._end(upload, refusal, item, now=now)
             return
         upload.items.append(item)
+        upload.rights, upload.submitter = client.rights, client.who
         upload.form = upload.last_form
         if isinstance(message, m.MissionItemInt):
             keep_latest(self._sends_int, upload.sender, None, most=INT_SENDERS)
