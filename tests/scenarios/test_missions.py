@@ -1,10 +1,13 @@
 """Plans: uploaded, looked at, started, driven, cleared."""
 
+from math import inf
+
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.config.settings import Settings
 from mav_tasks.engine.inputs import PeerChanged
 from mav_tasks.shell.in_memory import CLIENT_LINK
+from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
@@ -285,6 +288,39 @@ def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: st
     assert acks(world.client)[-1].result not in (0, None)
     assert start(world) == (ACCEPTED, 1)
     world.until_state(1, S.COMPLETED, within=60)
+
+
+@for_each("clears", [True, False])
+@for_each("delay, result", [(0.2, 0), (inf, 1)])
+def test_the_end_of_the_mission_before_is_stored_before_the_ack(
+    make_world: MakeWorld, delay: float, result: int, *, clears: bool
+) -> None:
+    store = LateStore()
+    world = make_world(store=store)
+    uploaded(world)
+    store.delay = 0.2
+    if clears:
+        world.client.send(clear_all())
+    else:
+        Upload(world.client, PLAN[:2])
+    world.until(lambda: world.state(1)[0] is S.CANCELLED, within=1)
+    store.delay = delay
+    world.until(lambda: len(acks(world.client)) == 2, within=1)
+    assert acks(world.client)[-1].result == result
+    kept = {event.new for event in store.left_by_a_crash() if isinstance(event, TaskChanged)}
+    assert (S.CANCELLED in kept) is (result == 0)
+
+
+def test_a_clear_ends_also_a_paused_mission_that_was_replaced(world: World) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.EXECUTING)
+    uploaded(world)
+    world.client.pause(target=(1, 1))
+    world.until_state(1, S.PAUSED)
+    world.client.send(clear_all())
+    world.run(0.2)
+    assert world.state(1) == (S.CANCELLED, R.REPLACED)
 
 
 def test_a_start_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:

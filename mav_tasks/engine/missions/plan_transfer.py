@@ -47,6 +47,7 @@ from mav_tasks.engine.missions.transfer import MissionParts, Sender, Transfer, U
 from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.services.commands import NO_MESSAGE, Command
 from mav_tasks.engine.services.missions import Item, item_of, packed
+from mav_tasks.engine.timers import Effect
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.kinds import GoTo
 from mav_tasks.mavlink import messages as m
@@ -295,8 +296,7 @@ class PlanTransfer(Transfer):
             if parts.registry.get(task.id) is None:
                 return  # retracted, and answered
             parts.vehicles.mark_dirty(vehicle)  # a task may start
-            self.finish(task.id, now=now)
-            what = "queued"
+            what, last = "queued", parts.registry.recorded
             if is_staged:
                 plans.end_replaced(vehicle, is_started=False, actor=actor, now=now)
                 plans.begin_at(vehicle, 0)
@@ -306,7 +306,12 @@ class PlanTransfer(Transfer):
                     what += f", task {active.id} goes on until then"
             words = f"Task {task.id} {what}: {task.goal.words}{skipped(task.goal)}"
             words += chosen_words(task)
-            parts.gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+
+            def acknowledge(*, now: float) -> None:
+                self.finish(task.id, now=now)
+                parts.gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+
+            self._once_ended(last, acknowledge, self.finish, now=now)
 
         def withdraw(*, now: float) -> None:
             if parts.registry.get(task.id) is None:
@@ -318,6 +323,22 @@ class PlanTransfer(Transfer):
             self.finish(Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted"), now=now)
 
         submissions.gate.hold(accept, withdraw, now=now)
+
+    def _once_ended(self, last: int, accept: Effect, answer: Answer, *, now: float) -> None:
+        """Do ``accept`` once it is durable that missions have ended: all events after ``last``.
+
+        They end only once the plan in their place is stored, because that cannot be undone. Killed
+        after an earlier acknowledgement, the server would drive one of them on.
+        """
+        if self.parts.registry.recorded == last:
+            accept(now=now)
+            return
+
+        def refuse(*, now: float) -> None:
+            words = "not stored in time that the earlier mission has ended: send it again"
+            answer(Rejection(R.STORE_UNAVAILABLE, words), now=now)
+
+        self.parts.submissions.gate.hold(accept, refuse, now=now)
 
     def _go_to(
         self,
@@ -373,7 +394,8 @@ class PlanTransfer(Transfer):
         if task is not None and is_late and task.state is TaskState.HELD:
             words = f"clear: delayed by the server; task {task.id} is held now: clear again"
             raise Rejection(R.STALE, words)
-        left = [kind for kind in kinds if plans.stored(vehicle.system_id, kind).plan_id]
+        stored = partial(plans.stored, vehicle.system_id)
+        left = [kind for kind in kinds if kind == MISSION or stored(kind).plan_id]
         answer = partial(self.answer, sender, message_id=m.MissionClearAll.id)
         self._store(left, (), sender, answer, now=now)
 
@@ -420,9 +442,16 @@ class PlanTransfer(Transfer):
 
             def accept(*, now: float) -> None:
                 parts.vehicles.mark_dirty(vehicle)
+                last = parts.registry.recorded
+
+                def acknowledge(*, now: float) -> None:
+                    answer(plan.plan_id, now=now)
+
                 if MISSION in kinds:
                     plans.let_go(vehicle, before[MISSION].plan_id, actor=actor, now=now)
-                answer(plan.plan_id, now=now)
+                    # also one that a crash has left, between a plan and the end of the one before
+                    plans.end_replaced(vehicle, is_started=False, actor=actor, now=now)
+                self._once_ended(last, acknowledge, answer, now=now)
 
             def give_up(*, now: float) -> None:
                 for kind, stored in before.items():
