@@ -1,5 +1,7 @@
 """The fence: what it forbids at submission, at the start, and while driving; rally points."""
 
+from math import inf
+
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.config.settings import Driving, Settings, Watch
@@ -9,8 +11,9 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL
-from tests.kit.mission import Download, Item, Upload
+from tests.kit.mission import Download, Item, Upload, acks
 from tests.kit.rows import check
+from tests.kit.store import LateStore
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
@@ -174,6 +177,34 @@ def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float, tries
         world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
         world.run(1)
     assert on_board(world) == []
+
+
+@for_each(
+    "delay, lost, left, words",
+    [
+        (inf, (), 4, "not stored in time: nothing changed"),
+        (inf, (4, FENCE), 0, "nothing changed; rover 1 did not take its earlier fence"),
+        (0.0, (0, RALLY_POINTS), 4, "rover 1 did not answer: not stored"),
+    ],
+)
+def test_the_rover_has_a_fence_again_that_was_not_removed(
+    make_world: MakeWorld, delay: float, lost: tuple[int, ...], left: int, words: str
+) -> None:
+    """``lost``: the count that does not reach it, by its number and its type."""
+    store = LateStore()
+    world = make_world(store=store)
+    fenced(world, *YARD)
+    fenced(world, Item(RALLY, **at(1, 1)), kind=RALLY_POINTS)
+    store.delay = delay
+    world.watched.loses = lambda _, to, data: (
+        (to, data[7]) == ("rover1", MISSION_COUNT) and (data[10], data[14]) == lost
+    )
+    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
+    world.run(0.3)
+    assert on_board(world) == []
+    world.run(3)
+    assert (len(on_board(world)), acks(world.client)[-1].result) == (left, 1)
+    assert world.client.said(words)
 
 
 def test_an_acceptance_that_comes_late_is_none_of_a_fence_that_never_reached_the_rover(

@@ -46,7 +46,7 @@ from mav_tasks.engine.missions.plans import (
 from mav_tasks.engine.missions.transfer import MissionParts, Sender, Transfer, Upload
 from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.services.commands import NO_MESSAGE, Command
-from mav_tasks.engine.services.missions import Item, item_of, packed
+from mav_tasks.engine.services.missions import Item, item_of, packed, unpacked
 from mav_tasks.engine.timers import Effect
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.kinds import GoTo
@@ -111,6 +111,16 @@ class Answer(Protocol):
     """Answers a client: with a plan's id, or a refusal."""
 
     def __call__(self, answer: Rejection | int, /, *, now: float) -> object: ...
+
+
+#: results of a vehicle that has a plan, or for which there is none
+WRITTEN = frozenset({MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED})
+
+
+class Written(Protocol):
+    """Is told the last result of a vehicle, None without an answer, and how often it was asked."""
+
+    def __call__(self, result: MavMissionResult | None, *, asked: int, now: float) -> None: ...
 
 
 class PlanTransfer(Transfer):
@@ -411,29 +421,25 @@ class PlanTransfer(Transfer):
         """Store one plan for each of these types: an empty mission, fence or rally points.
 
         The vehicle gets the bounds first, which it enforces without the server. If it does not
-        support them, they are stored; if it refuses them or does not answer, nothing is. Raise
-        Rejection if they are no valid fence: the one before stays in force.
+        support them, they are stored; if it refuses them or does not answer, nothing is. If nothing
+        is stored, it gets the earlier ones back. Raise Rejection if they are no valid fence: the
+        one before stays in force.
         """
         parts, vehicle, actor = self.parts, self._vehicle, str(sender.address)
-        plans, source, for_vehicle = parts.plans, packed(items), items
-        plan = Stored(crc32(source.encode()), source)
-        left = [kind for kind in kinds if kind != MISSION]
+        plans, source = parts.plans, packed(items)
+        plan, rover = Stored(crc32(source.encode()), source), f"rover {vehicle.system_id}"
+        bounds = [kind for kind in kinds if kind != MISSION]
         if MavMissionType.FENCE in kinds:
             fence_of(items)
-            for_vehicle = fence_for_vehicle(items)
 
-        # opaque_id is the vehicle's own id of the plan, which means nothing to clients
-        def write_next(result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:  # noqa: ARG001
-            if result is None:
-                words = f"rover {vehicle.system_id} did not answer: not stored"
-                answer(Rejection(R.VEHICLE_SILENT, words), now=now)
-            elif result not in (MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED):
-                words = f"rover {vehicle.system_id} refused it: {result.name}"
-                answer(Rejection(R.NOT_ALLOWED, words), now=now)
-            elif left:
-                vehicle.requests.write_plan(left.pop(0), for_vehicle, write_next, now=now)
-            else:
+        def written(result: MavMissionResult | None, *, asked: int, now: float) -> None:
+            if result in WRITTEN:
                 store(now=now)
+                return
+            refusal = Rejection(R.VEHICLE_SILENT, f"{rover} did not answer: not stored")
+            if result is not None:
+                refusal = Rejection(R.NOT_ALLOWED, f"{rover} refused it: {result.name}")
+            put_back(bounds[: asked - 1], refusal, now=now)
 
         def store(*, now: float) -> None:
             before = {kind: plans.stored(vehicle.system_id, kind) for kind in kinds}
@@ -457,11 +463,46 @@ class PlanTransfer(Transfer):
                 for kind, stored in before.items():
                     plans.keep(vehicle, kind, stored, actor=actor, now=now)
                 words = "not stored in time: nothing changed"
-                answer(Rejection(R.STORE_UNAVAILABLE, words), now=now)
+                put_back(bounds, Rejection(R.STORE_UNAVAILABLE, words), now=now)
 
             parts.submissions.gate.hold(accept, give_up, now=now)
 
-        write_next(MavMissionResult.ACCEPTED, opaque_id=0, now=now)
+        def put_back(taken: list[int], refusal: Rejection, *, now: float) -> None:
+            """Refuse, once the vehicle has again what is in force instead of what it has taken."""
+
+            def refuse(result: MavMissionResult | None, *, asked: int, now: float) -> None:  # noqa: ARG001
+                words = refusal.text
+                if result not in WRITTEN:
+                    words += f"; {rover} did not take its earlier fence or rally points back"
+                    words += ": upload them again"
+                answer(Rejection(TaskReason(refusal.reason), words), now=now)
+
+            in_force = [unpacked(plans.stored(vehicle.system_id, kind).source) for kind in taken]
+            self._write(taken, in_force, refuse, now=now)
+
+        self._write(bounds, [items] * len(bounds), written, now=now)
+
+    def _write(
+        self, kinds: Sequence[int], items: Sequence[tuple[Item, ...]], done: Written, *, now: float
+    ) -> None:
+        """Write bounds of these types to the vehicle, in turn, until it does not take one."""
+        requests = self._vehicle.requests
+
+        # opaque_id is the vehicle's own id of the plan, which means nothing to clients
+        def write_next(
+            asked: int,
+            result: MavMissionResult | None,
+            *,
+            opaque_id: int,  # noqa: ARG001
+            now: float,
+        ) -> None:
+            if result not in WRITTEN or asked == len(kinds):
+                done(result, asked=asked, now=now)
+                return
+            after = partial(write_next, asked + 1)
+            requests.write_plan(kinds[asked], fence_for_vehicle(items[asked]), after, now=now)
+
+        write_next(0, MavMissionResult.ACCEPTED, opaque_id=0, now=now)
 
 
 __all__ = ["MissionMessage", "MissionServers"]
