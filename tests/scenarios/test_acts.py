@@ -14,7 +14,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import NO_FAULTS, Faults
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, packed
+from tests.kit.client import ACCEPTED, FAILED, packed
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import check, item
 from tests.kit.store import PromptSqliteStore
@@ -49,6 +49,12 @@ def told_without_an_answer(world: World, faults: Faults = UNANSWERED) -> int:
     task = upload(world, TOLD)
     world.until(lambda: times_told(world) == 1, within=10.0)
     return task
+
+
+def say(world: World, result: int) -> None:
+    """Let the rover answer a command to its relay."""
+    ack = common.MAVLink_command_ack_message(RELAY, result)
+    world.from_vehicle_side(packed(ack, 1, 1, seq=200), peer="rover1")
 
 
 def test_it_is_told_once_between_two_drives_while_the_rover_stands(world: World) -> None:
@@ -130,8 +136,7 @@ def test_the_answer_counts_also_if_another_task_goes_first_meanwhile(make_world:
     task = told_without_an_answer(world)
     other = upload(world, "NAV_WAYPOINT at=1,0; TASK_OPTIONS 10 frame=2")
     world.until_state(other, S.EXECUTING)
-    late = common.MAVLink_command_ack_message(RELAY, 0, 0, 0, 0, 0)
-    world.from_vehicle_side(packed(late, 1, 1, seq=200), peer="rover1")
+    say(world, ACCEPTED)
     world.run(15.0)
     assert [world.state(each)[0] for each in (task, other)] == [S.COMPLETED] * 2
     assert times_told(world) == 1
@@ -188,16 +193,30 @@ def test_a_parameter_that_cannot_be_sent_is_named(value: float, at: int, kind: s
 
 def test_an_act_has_time_as_long_as_the_rover_says_that_it_goes_on(world: World) -> None:
     task = told_without_an_answer(world)
-
-    def say(result: int) -> None:
-        ack = common.MAVLink_command_ack_message(RELAY, result)
-        world.from_vehicle_side(ack.pack(common.MAVLink(None, 1, 1)), peer="rover1")
-
     for _ in range(4):
         world.run(2.5)
-        say(IN_PROGRESS)
+        say(world, IN_PROGRESS)
     world.run(2.5)
     assert world.state(task) == (S.EXECUTING, R.NONE)
-    say(ACCEPTED)
+    say(world, ACCEPTED)
     world.until_state(task, S.COMPLETED, within=1.0)
     assert times_told(world) == 1
+
+
+@for_each("end", [ACCEPTED, FAILED])
+def test_the_answer_to_an_act_that_was_cancelled_is_not_that_to_the_next(
+    world: World, end: int
+) -> None:
+    first = told_without_an_answer(world)
+    world.client.command(54010, first)
+    second = upload(world, TOLD.replace("0", "1"))
+    for _ in range(2):
+        world.run(2.0)
+        say(world, IN_PROGRESS)
+    world.run(2.0)
+    assert times_told(world) == 1
+    say(world, end)
+    world.run(1.0)
+    assert (times_told(world), world.state(second)[0]) == (2, S.EXECUTING)
+    say(world, ACCEPTED)
+    world.until_state(second, S.COMPLETED, within=1.0)

@@ -132,7 +132,18 @@ class _Request:
     is_outdated: Callable[[], bool] = lambda: False  # while it waits; then it is not sent
     turn: int = 0  # commands of the same client that were before it in the lane
     joined: list["_Request"] = field(default_factory=list)  # of other clients, the same wish
-    counts_from_send: bool = False  # the time in which it must be answered
+    #: sent once, because each copy is carried out; the time for its answer counts from then
+    is_once: bool = False
+    goes_on_at: float = -inf  # when the vehicle last said so
+
+    @property
+    def owed_until(self) -> float:
+        """Until when its answer may still come, if nobody waits for it any more.
+
+        What is sent once is not answered until it is done, or IN_PROGRESS meanwhile.
+        """
+        sent_at = self.retry.sent_at
+        return max(sent_at + (WORKING if self.is_once else LATE), self.goes_on_at + WORKING)
 
     @property
     def wait_until(self) -> float:
@@ -161,6 +172,12 @@ class _Lane:
     def requests(self) -> list[_Request]:
         """What is in flight and what waits."""
         return [*([self.in_flight] if self.in_flight else []), *self.waiting]
+
+    def set_aside(self) -> None:
+        """Forget what is in flight; nothing is sent that its late answer could be taken for."""
+        assert self.in_flight is not None
+        self.quiet_until, self.late = self.in_flight.owed_until, self.in_flight.retry.sent
+        self.in_flight = None
 
 
 class CommandSender:
@@ -210,7 +227,7 @@ class CommandSender:
         retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
         lane = (component, message.command)
         request = _Request(None, lane, message, None, retry, is_outdated=is_outdated)
-        request.counts_from_send = True
+        request.is_once = True
         self._enqueue(request, now=now)
 
     def drop(self, message: CommandLong | CommandInt) -> None:
@@ -219,9 +236,7 @@ class CommandSender:
             lane.waiting = [each for each in lane.waiting if each.message is not message]
             flying = lane.in_flight
             if flying is not None and flying.message is message:
-                lane.quiet_until = flying.retry.sent_at + LATE
-                lane.late = flying.retry.sent
-                lane.in_flight = None
+                lane.set_aside()
 
     def repeat(self, message: CommandLong | CommandInt, *, now: float) -> bool:
         """Send one copy more of a command of our own, which is given up as much later.
@@ -266,9 +281,7 @@ class CommandSender:
             return
         lane.waiting = [request for request in lane.waiting if request.origin is not None]
         if lane.in_flight is not None and lane.in_flight.origin is None:
-            lane.quiet_until = lane.in_flight.retry.sent_at + LATE
-            lane.late = lane.in_flight.retry.sent
-            lane.in_flight = None
+            lane.set_aside()
 
     def cancel(self, component: int, command: int, *, now: float) -> None:
         """As ``withdraw``, and whatever clients wait for is answered: not by the vehicle."""
@@ -299,8 +312,7 @@ class CommandSender:
         if lane is None:
             return
         if lane.in_flight is None:
-            if is_over:
-                self._take_late(lane, ack, now=now)
+            self._take_late(lane, ack, is_over=is_over, now=now)
             return
         packet = lane.in_flight.packet
         asker = self._source if packet is None else packet.source
@@ -370,21 +382,26 @@ class CommandSender:
         """
         if request.is_urgent:
             return
-        retry = request.retry
+        retry, request.goes_on_at = request.retry, now
         retry.give_up_at = retry.next_at = max(retry.give_up_at, now + WORKING)
         if request.origin is not None:
             self._answers.append(
                 Answered(request.origin, *request.lane, ack, request.message, True)
             )
 
-    def _take_late(self, lane: _Lane, ack: CommandAck, *, now: float) -> None:
+    def _take_late(self, lane: _Lane, ack: CommandAck, *, is_over: bool, now: float) -> None:
         """Let the lane go on after the last ack of a command of ours that was withdrawn."""
         is_ours = Address(ack.target_system, ack.target_component).reaches(self._source)
-        if lane.late and is_ours:
-            lane.late -= 1
-            if not lane.late:
-                lane.quiet_until = now
-                self._advance(lane, now=now)
+        if not lane.late or not is_ours:
+            return
+        if not is_over:
+            if now < lane.quiet_until:
+                lane.quiet_until = max(lane.quiet_until, now + WORKING)
+            return
+        lane.late -= 1
+        if not lane.late:
+            lane.quiet_until = now
+            self._advance(lane, now=now)
 
     def _enqueue(self, request: _Request, *, now: float) -> None:
         if len(self._lanes) > KEPT_LANES:
@@ -441,7 +458,7 @@ class CommandSender:
             self._send(flying, now=now)
 
     def _send(self, request: _Request, *, now: float) -> None:
-        if request.counts_from_send and not request.retry.sent:
+        if request.is_once and not request.retry.sent:
             request.retry.give_up_at += now - request.retry.next_at
         request.retry.note_sent(now)
         self._outgoing.append(request.message if request.packet is None else request.packet)
