@@ -95,7 +95,6 @@ def test_a_task_for_any_rover_and_a_plan_wait_for_the_answer(pair: Pair) -> None
 def test_a_plan_that_waits_has_the_rights_of_its_client(pair: Pair) -> None:
     first = pair.submit(A)
     slow = pair.add_client("slow", system_id=200, server="b:clients")
-    pair.run(0.1)
     pair.b.is_looking = False
     items = [Item(16, **at(1, 3)), Item(54014, param4=first, frame=2)]
     plan = Upload(slow, items, target=(B, 191))

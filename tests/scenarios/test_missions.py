@@ -269,13 +269,16 @@ def test_nobody_is_taken_the_sticks_from_by_a_start(world: World, how: str) -> N
     assert world.observer.sent_since(at_start) in ([], ["MANUAL_CONTROL"])
 
 
-@for_each("what", ["clear", "empty upload", "fence"])
+@for_each("what", ["clear", "upload and clear", "empty upload", "fence"])
 def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: str) -> None:
     store = LateStore(delay=0.0)
     world = make_world(store=store)
     uploaded(world)
     store.delay = 5.0
-    if what == "clear":
+    if what == "upload and clear":
+        Upload(world.client, PLAN)
+        world.run(0.2)
+    if "clear" in what:
         world.client.send(clear_all())
     elif what == "empty upload":
         Upload(world.client, ())
@@ -302,7 +305,7 @@ def test_the_end_of_the_mission_before_is_stored_before_the_ack(
     if clears:
         world.client.send(clear_all())
     else:
-        Upload(world.client, PLAN[:2])
+        Upload(world.client, PLAN)
     world.until(lambda: world.state(1)[0] is S.CANCELLED, within=1)
     store.delay = delay
     world.until(lambda: len(acks(world.client)) == 2, within=1)

@@ -296,10 +296,13 @@ class PlanTransfer(Transfer):
         if not is_staged and upload.begun_at < halts.at:
             raise Rejection(R.STALE, f"{halts.words} came during the upload: upload it again")
         before, actor = plans.stored(vehicle.system_id, MISSION), str(address)
+        finish: Answer = self.finish
         if is_staged:
             self._check_own(upload)
+            self._check_alone([MISSION])
         task = submissions.submit_plan(upload.rights, vehicle, draft, now=now)
         if is_staged:
+            finish = self._alone([MISSION], upload.sender, finish)
             plans.keep(vehicle, MISSION, Stored(task.id, plan.source), actor=actor, now=now)
 
         def accept(*, now: float) -> None:
@@ -318,10 +321,10 @@ class PlanTransfer(Transfer):
             words += chosen_words(task)
 
             def acknowledge(*, now: float) -> None:
-                self.finish(task.id, now=now)
+                finish(task.id, now=now)
                 parts.gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
-            self._once_ended(last, acknowledge, self.finish, now=now)
+            self._once_ended(last, acknowledge, finish, now=now)
 
         def withdraw(*, now: float) -> None:
             if parts.registry.get(task.id) is None:
@@ -330,9 +333,31 @@ class PlanTransfer(Transfer):
             submissions.take_back(vehicle, task, now=now)
             if is_staged:
                 plans.keep(vehicle, MISSION, before, actor=actor, now=now)
-            self.finish(Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted"), now=now)
+            finish(Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted"), now=now)
 
         submissions.gate.hold(accept, withdraw, now=now)
+
+    def _check_alone(self, kinds: Sequence[int]) -> None:
+        """Raise Rejection while plans of these types are being stored.
+
+        What is not stored in time gives way to the plan before it: that must be a stored one.
+        """
+        if any((self._vehicle.system_id, kind) in self.parts.storing for kind in kinds):
+            raise Rejection(R.WRONG_STATE, "another change of that plan is being stored: wait")
+
+    def _alone(
+        self, kinds: Sequence[int], sender: Sender, answer: Answer, *, clears: bool = False
+    ) -> Answer:
+        """Keep other changes of these plans out until the returned answer is given."""
+        storing, rover = self.parts.storing, self._vehicle.system_id
+        storing.update(((rover, kind), (sender, clears)) for kind in kinds)
+
+        def end(given: Rejection | int, /, *, now: float) -> None:
+            for kind in kinds:
+                storing.pop((rover, kind), None)
+            answer(given, now=now)
+
+        return end
 
     def _once_ended(self, last: int, accept: Effect, answer: Answer, *, now: float) -> None:
         """Do ``accept`` once it is durable that missions have ended: all events after ``last``.
@@ -404,10 +429,13 @@ class PlanTransfer(Transfer):
         if task is not None and is_late and task.state is TaskState.HELD:
             words = f"clear: delayed by the server; task {task.id} is held now: clear again"
             raise Rejection(R.STALE, words)
+        storing = {self.parts.storing.get((vehicle.system_id, kind)) for kind in kinds}
+        if storing - {None} == {(sender, True)}:
+            return  # it was repeated, and will be answered
         stored = partial(plans.stored, vehicle.system_id)
         left = [kind for kind in kinds if kind == MISSION or stored(kind).plan_id]
         answer = partial(self.answer, sender, message_id=m.MissionClearAll.id)
-        self._store(left, (), sender, answer, now=now)
+        self._store(left, (), sender, answer, clears=True, now=now)
 
     def _store(
         self,
@@ -416,6 +444,7 @@ class PlanTransfer(Transfer):
         sender: Sender,
         answer: Answer,
         *,
+        clears: bool = False,
         now: float,
     ) -> None:
         """Store one plan for each of these types: an empty mission, fence or rally points.
@@ -431,6 +460,8 @@ class PlanTransfer(Transfer):
         bounds = [kind for kind in kinds if kind != MISSION]
         if MavMissionType.FENCE in kinds:
             fence_of(items)
+        self._check_alone(kinds)
+        answer = self._alone(kinds, sender, answer, clears=clears)
 
         def written(result: MavMissionResult | None, *, asked: int, now: float) -> None:
             if result in WRITTEN:
@@ -530,6 +561,8 @@ class MissionServers:
         """End the transfers of a vehicle's plans: clients begin again at its next gateway."""
         for key in [each for each in self._transfers if each[0] == vehicle]:
             self._parts.timers.forget(self._transfers.pop(key).timer)
+        for plan in [each for each in self._parts.storing if each[0] == vehicle]:
+            del self._parts.storing[plan]
 
     def receive(
         self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float

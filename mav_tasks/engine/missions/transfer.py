@@ -93,6 +93,8 @@ class MissionParts:
     plans: Plans
     timers: Timers
     settings: Settings
+    #: the plans being stored, by vehicle and type: by whom, and whether that clears them
+    storing: dict[tuple[int, int], tuple["Sender", bool]] = field(default_factory=dict)
 
 
 class Sender(NamedTuple):
