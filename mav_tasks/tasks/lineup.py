@@ -11,10 +11,13 @@ from typing import NamedTuple
 from mav_tasks.basics.errors import Rejection
 from mav_tasks.config.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.kinds import SingleGoal
+from mav_tasks.kinds.guidance import Motion
+from mav_tasks.kinds.path import distance
 from mav_tasks.tasks.driving.bounds import Bounds, safe_braking
 from mav_tasks.tasks.driving.executor import Executor
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
-from mav_tasks.tasks.driving.watches import JumpWatch, LedAway
+from mav_tasks.tasks.driving.stage import is_off_line
+from mav_tasks.tasks.driving.watches import JumpWatch
 from mav_tasks.tasks.events import (
     SERVER,
     QueuePaused,
@@ -42,6 +45,7 @@ WAYS_OUT = {
     R.LOSS_FAILSAFE: f"it might drive on without setpoints, {SET_FAILSAFE}",
 }
 LEAVES_MODE = 1.5  # s in which a heartbeat shows the mode that was asked for with a task
+LED_AWAY = 2.0  # m, beyond its braking, from where tasks drove it last: something else moved it
 
 
 class Released(NamedTuple):
@@ -74,9 +78,11 @@ class Lineup:
         self.count_of = room.count_of
         #: add a task; raise Rejection if too many wait
         self.submit = room.submit
-        self.suspended_ids: dict[TaskId, None] = {}
+        #: suspended tasks, and whether anything but tasks may have moved the vehicle since: then
+        #: nobody knows the way back to their lines. Their client knows the way of later tasks
+        self.suspended_ids: dict[TaskId, bool] = {}
         self.of_earlier_run: set[TaskId] = set()
-        self.displaced = LedAway()
+        self._left: Motion | None = None  # when a task last had the vehicle
         #: why the queue is paused, or NONE
         self.paused = R.NONE
         #: when another vehicle with its id was heard last
@@ -335,7 +341,16 @@ class Lineup:
     def set_aside(self, task_id: TaskId) -> None:
         """Suspend the active task, so that another one can have the vehicle."""
         self.executor.give_up()
-        self.suspended_ids[task_id] = None
+        self.suspended_ids[task_id] = self._left is None  # since an earlier run
+
+    def note_moved(self, seen: VehicleView) -> None:
+        """Note in each suspended task if the vehicle is not where a task of ours left it."""
+        left, motion = self._left, seen.motion
+        if left is None or motion is None:
+            return
+        rolls = left.speed**2 / (2 * self.driving.acceleration)
+        if distance(left.pose, motion.pose) > LED_AWAY + rolls:
+            self.suspended_ids = dict.fromkeys(self.suspended_ids, True)
 
     def is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
         """Let a waiting task pre-empt the running one, if it may and can start. Return whether."""
@@ -375,13 +390,14 @@ class Lineup:
     def _begin(self, task: Task, seen: VehicleView, *, now: float) -> None:
         if task.state is S.QUEUED:
             self.room.leave(task)
-        else:
-            del self.suspended_ids[task.id]
+        self.note_moved(seen)
+        was_moved = self.suspended_ids.pop(task.id, False)
         self._begun_at = now
+        lost = R.NONE
         if self.is_of_another_frame(task, seen):
             lost = R.FRAME_RESET
-        else:
-            lost = R.OFF_TRACK if self.displaced.from_line_of(task, seen) else R.NONE
+        elif was_moved and seen.motion is not None and is_off_line(task, seen.motion.pose):
+            lost = R.OFF_TRACK
         if lost:
             self.executor.adopt(task)
             self.executor.hold(lost, now=now)

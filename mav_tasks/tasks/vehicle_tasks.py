@@ -68,7 +68,7 @@ class VehicleTasks(Lineup):
         for task in tasks:
             self.of_earlier_run.add(task.id)
             if self.active is not None or task.reason is R.PREEMPTED:
-                self.suspended_ids[task.id] = None
+                self.suspended_ids[task.id] = True  # who moved it meanwhile is not known
             elif task.id in resuming:
                 self.executor.take_over(task, now=now)
             else:
@@ -226,8 +226,6 @@ class VehicleTasks(Lineup):
         self.executor.pause(reason, actor=actor, now=now)
         self.pause_queue(reason, actor=actor, now=now)
         if reason in TAKEN:
-            if self.displaced.taken_over_at is None and self._jumps.last is not None:
-                self.displaced.taken_over_at = self._jumps.last.pose
             self._end_cancelling(actor=actor, now=now)
         return self.executor.task_id
 
@@ -255,7 +253,6 @@ class VehicleTasks(Lineup):
             self.paused = R.NONE
             self.halts.lets_go()
             self.registry.record(QueueContinued(self.vehicle, actor, now))
-            self.displaced.given_back(seen, self.suspended_ids)
         if resumed is not None and self.is_of_another_frame(resumed, seen):
             self.executor.hold(R.FRAME_RESET, now=now)
         elif resumed is not None:
@@ -443,6 +440,9 @@ class VehicleTasks(Lineup):
             self.stopping_after_kill = False
         self._look_at_released(seen, now=now)
         before, executor = self.active, self.executor
+        if before is not None and seen.in_control:
+            self.note_moved(seen)
+            self._left = seen.motion
         demand = executor.step(seen, now=now)
         if before is not None:
             self._note_step(before, now=now)

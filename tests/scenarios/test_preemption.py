@@ -1,17 +1,23 @@
 """A more urgent task interrupts another, which then ends exactly where it would have ended."""
 
-from math import hypot
+from math import hypot, nan
+from pathlib import Path
 from random import Random
 
 from mav_tasks.config.settings import Queueing, Settings
 from mav_tasks.tasks.events import TaskChanged
+from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.body import Pose
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import MOVE, ROTATE
+from tests.kit.restarts import UTC, restart
 from tests.kit.rows import check
+from tests.kit.store import PromptSqliteStore
 from tests.kit.volume import tries
-from tests.kit.world import World, near_pose
+from tests.kit.words import CANCEL, REPOSITION
+from tests.kit.world import World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 GAP = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
@@ -117,3 +123,41 @@ def test_whatever_interrupts_it_ends_where_it_would_have_ended(
     assert world.states() == [S.COMPLETED] * others
     assert near_pose(world.pose(), end), world.pose()
     assert hypot(world.truth.forward_speed, world.truth.yaw_rate) < 0.05
+
+
+def carry(world: World) -> None:
+    for _ in range(80):
+        seen = world.truth
+        world.rover.place(Pose(north=seen.north, east=seen.east + 0.1, yaw=seen.yaw))
+        world.run(0.1)
+
+
+@for_each("where", ["paused", "disarmed", "restarted", "ended well", "before a click"])
+def test_it_does_not_drive_back_from_where_no_task_has_driven(
+    make_world: MakeWorld, tmp_path: Path, where: str
+) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    world = make_world(settings=GAP, store=PromptSqliteStore(path, wall_offset=UTC))
+    world.client.move(4)
+    world.run(4)
+    if where != "before a click":
+        world.client.rotate(90, priority=9)
+        world.until_state(2, S.EXECUTING)
+    world.client.pause()
+    world.run(2)
+    if where == "disarmed":
+        world.client.arm(False)
+        world.run(2)
+    carry(world)
+    if where not in ("paused", "disarmed"):
+        restart(world, path, well=where == "ended well")
+    if where == "before a click":
+        world.client.command_int(REPOSITION, -1, 1, 0, nan, target=(1, 1), frame=6, **at(1, 8))
+    else:
+        world.client.command(CANCEL, 2)
+    world.run(4)
+    there = world.pose()
+    world.client.proceed()
+    world.run(10)
+    assert world.state(1) == (S.HELD, R.OFF_TRACK)
+    assert near_pose(world.pose(), there)

@@ -1,11 +1,10 @@
-"""Watches of one vehicle: it stands although told to move, goes astray, or was moved by others.
+"""Watches of one vehicle: it stands although told to move, goes astray, or its pose jumps.
 
 A closed loop on a wrong heading, or on wheels that turn the wrong way, drives away from its end
 ever faster. So a vehicle must come nearer to its end, move where it points, and stay on its line,
 by its own measurements.
 """
 
-from collections.abc import Iterable
 from dataclasses import replace
 from math import copysign, inf, pi, radians
 
@@ -15,8 +14,6 @@ from mav_tasks.kinds.base import OFF_TRACK
 from mav_tasks.kinds.guidance import Motion, Velocity, is_far_off
 from mav_tasks.kinds.path import distance, forward_of, wrap
 from mav_tasks.tasks.driving.path_follower import PathFollower
-from mav_tasks.tasks.driving.stage import is_off_line
-from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.view import VehicleView
 
 SAID_AFTER = 1.5  # s of commands without motion before the warning; the slowest rover took 0.6
@@ -42,7 +39,6 @@ CORRECTED = 0.1  # m beyond what it drove between two looks: its estimate was co
 
 JUMP = 2.0  # m beyond the distance that the vehicle can have driven meanwhile
 TURN = radians(45)  # rad, the same for the heading
-LED_AWAY = 2.0  # m from where the vehicle was taken over: more than it takes to brake
 
 
 class Follows:
@@ -247,27 +243,3 @@ class JumpWatch:
         if abs(wrap(here.yaw - there.yaw)) > TURN + 2 * driving.max_turn_rate * elapsed:
             return True
         return distance(here, there) > JUMP + 2 * driving.max_speed * elapsed
-
-
-class LedAway:
-    """Record of one vehicle's takeovers: suspended tasks whose vehicle was driven far away.
-
-    Another task may leave the vehicle anywhere, but their client knows the way between the two
-    tasks. Nobody knows what lies between a task's line and a place reached under manual control.
-    """
-
-    def __init__(self) -> None:
-        self.taken_over_at: Pose | None = None  #: where the vehicle was taken over
-        self._tasks: set[TaskId] = set()
-
-    def given_back(self, seen: VehicleView, aside: Iterable[TaskId]) -> None:
-        """Note that the vehicle is ours again; ``aside`` are the tasks that are still suspended."""
-        at, self.taken_over_at = self.taken_over_at, None
-        if at is not None and seen.motion is not None and distance(seen.motion.pose, at) > LED_AWAY:
-            self._tasks.update(aside)
-
-    def from_line_of(self, task: Task, seen: VehicleView) -> bool:
-        """Return whether a takeover displaced the vehicle from a resuming task; True only once."""
-        was_led_away = task.id in self._tasks
-        self._tasks.discard(task.id)
-        return was_led_away and seen.motion is not None and is_off_line(task, seen.motion.pose)
