@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 
 from mav_tasks.basics.clock import boot_time
 from mav_tasks.basics.errors import StoreError
@@ -14,11 +15,12 @@ from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
 from mav_tasks.store.halt_keeper import HaltKeeper
-from mav_tasks.store.halt_record import HaltRecord, Word, event_of, word_of
+from mav_tasks.store.halt_record import ENDS, HaltRecord, Word, event_of, words_of
 from mav_tasks.store.journal import Journal
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.writer import Writer
 from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
 
 HALTS_LIMIT = 1.0  # s at shutdown for writing the last halts
@@ -50,6 +52,7 @@ class DurableStore:
         self._wall_offset = wall_offset
         self.name = self.place = name
         self._database = database
+        self._stopped: dict[int, TaskReason] = {}  # by vehicle
         try:
             was_complete = self._catch_up(record)
         except BaseException:
@@ -84,9 +87,10 @@ class DurableStore:
     def load(self) -> Restored:
         """Return the stored state, times in this process's monotonic seconds; raise StoreError."""
         with closing(self._database.reader()) as reader:
-            return reading.read_restored(
+            restored = reading.read_restored(
                 reader, offset=self._wall_offset(), ended_well=self._ended_well, idle=self._idle
             )
+        return replace(restored, stopped=self._stopped)
 
     def journal(self) -> Iterator[tuple[int, Event]]:
         """Yield every stored event, numbered over the life of the store; raise StoreError."""
@@ -99,10 +103,11 @@ class DurableStore:
             raise ValueError("the store is closed")
         first, offset = self._number + 1, self._wall_offset()
         self._number += len(events)
-        words = [
-            word_of(event, number, offset=offset) for number, event in enumerate(events, first)
+        halts = [
+            word
+            for number, event in enumerate(events, first)
+            for word in words_of(event, number, offset=offset)
         ]
-        halts = [word for word in words if word is not None]
         if halts:
             self._keeper.append(halts, through=self._number)
         self._writer.append(tuple(events))
@@ -139,10 +144,14 @@ class DurableStore:
     def _catch_up(self, record: HaltRecord) -> bool:
         """Write newer words of the halt record to the database; return False if it lacked any."""
         database = self._database
-        newer = self._missing(record.words_after(database.last_number))
+        missing = self._missing(record.words_after(database.last_number))
+        ends = [word for word in missing if word.register in ENDS.values()]
+        newer = [word for word in missing if word not in ends]
         next_id = record.next_id_after(database.last_number)
+        for word in sorted(ends, key=lambda word: word.reason is TaskReason.STOPPED):
+            self._stopped[word.vehicle] = word.reason  # STOP ends more than an emergency stop
         if not newer and next_id is None:
-            return True
+            return not ends
         offset = self._wall_offset()
         batch = Batch(
             [event_of(word, offset=offset) for word in newer],
@@ -153,6 +162,8 @@ class DurableStore:
         )
         batch.next_id = next_id
         try:
+            if ends:  # the server that opens the store ends these tasks with its first events
+                record.outlast(ends, batch.last + 1)
             database.write(batch, utc=database.last_write or 0.0)
         except Exception as error:
             words = database.failure(error)

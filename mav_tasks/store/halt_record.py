@@ -5,6 +5,9 @@ file system may still refuse; ``halt_keeper`` reports that.) The file has the la
 each register of each vehicle, with the number of its event in the journal. A word with a higher
 number than the database's last event is newer than the database.
 
+A STOP, or an emergency stop, also ends tasks. Its own register tells the next server that the
+database may still have these, whatever halts or resumes the vehicle later.
+
 Each register has two cells, in different pages. A word overwrites the older cell, so that a torn
 write leaves the previous word. Cells of registers that a later version adds go to the end of the
 file; opening extends a shorter file. Vehicle 0, which does not exist, has the next task id, so that
@@ -16,9 +19,9 @@ and all of its copies do: another store's halts are not taken for this one's.
 
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from errno import EIO
 from pathlib import Path
@@ -54,12 +57,18 @@ class Register(IntEnum):
     QUEUE = 0  # reason of the pause; NONE: the queue was continued
     HALTS = 1  # value: the halt epoch
     ARMING = 2  # value: whether the server may arm the vehicle
+    STOPS = 3  # of HALTS, the last STOP
+    EMERGENCIES = 4  # the last emergency stop of a ground station
 
+
+#: what has ended tasks: by its reason
+ENDS = {TaskReason.STOPPED: Register.STOPS, TaskReason.STOP: Register.EMERGENCIES}
 
 FIRST_ONES = 2 * VEHICLES  # number of registers in the first version
 REGISTERS = len(Register) * VEHICLES
-SIZE = len(HEADER) + SLOTS * REGISTERS * CELL
 FIRST_SIZE = len(HEADER) + SLOTS * FIRST_ONES * CELL
+ADDED = SLOTS * VEHICLES * CELL  # bytes, of a register of a later version
+SIZE = FIRST_SIZE + (len(Register) - 2) * ADDED
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,24 +97,26 @@ class Word:
         return self.register is Register.QUEUE and self.reason is not TaskReason.NONE
 
 
-def word_of(event: Event, number: int, *, offset: float) -> Word | None:
-    """Return the word for an event, or None; ``offset`` is UTC minus monotonic seconds."""
+def words_of(event: Event, number: int, *, offset: float) -> list[Word]:
+    """Return the words for an event; ``offset`` is UTC minus monotonic seconds."""
     match event:
         case QueuePaused(vehicle=vehicle, reason=reason, actor=actor, at=at):
-            return Word(vehicle, number, reason, actor, at + offset)
+            return [Word(vehicle, number, reason, actor, at + offset)]
         case VehicleHalted(vehicle=vehicle, reason=reason, actor=actor, epoch=epoch, at=at):
-            register = Register.HALTS
-            return Word(vehicle, number, reason, actor, at + offset, register, epoch)
+            halt = Word(vehicle, number, reason, actor, at + offset, Register.HALTS, epoch)
+            ends = [replace(halt, register=ENDS[reason])] if reason in ENDS else []
+            return ends if reason is TaskReason.STOP else [halt, *ends]
         case QueueContinued(vehicle=vehicle, actor=actor, at=at):
-            return Word(vehicle, number, TaskReason.NONE, actor, at + offset)
+            return [Word(vehicle, number, TaskReason.NONE, actor, at + offset)]
         case VehicleArmingSet(vehicle=vehicle, may_arm=may_arm, at=at):
             register, value = Register.ARMING, int(may_arm)
-            return Word(vehicle, number, utc=at + offset, register=register, value=value)
+            return [Word(vehicle, number, utc=at + offset, register=register, value=value)]
         case _:
-            return None
+            return []
 
 
 def event_of(word: Word, *, offset: float) -> Event:
+    """Return the event for a word of a register that the database has, too."""
     at = word.utc - offset
     if word.register is Register.HALTS:
         return VehicleHalted(word.vehicle, word.value, word.reason, word.actor, at)
@@ -136,7 +147,7 @@ class HaltRecord:
             raise self._error(str(error)) from None
         try:
             content = os.pread(self._file.fd, SIZE + 1, 0)
-            if len(content) == FIRST_SIZE:
+            if (len(content) - FIRST_SIZE) in range(0, SIZE - FIRST_SIZE, ADDED):
                 content = content.ljust(SIZE, b"\0")
             self._newest = dict(_words_in(content))
             self._rewrite(content)
@@ -201,6 +212,16 @@ class HaltRecord:
         if os.pread(self._file.fd, len(HEADER), 0) != self._header:
             raise OSError(EIO, "another file was copied over it while it was in use")
 
+    def outlast(self, words: Sequence[Word], number: int) -> None:
+        """Give words a later number, so that they count until an event of that number is stored.
+
+        Raise StoreError if that fails.
+        """
+        try:
+            self.write(*(replace(word, number=number) for word in words))
+        except OSError as error:
+            raise self._error(error.strerror or str(error)) from error
+
     def note_next_id(self, next_id: int, *, number: int) -> None:
         """Write the next task id as of event ``number``, without a sync.
 
@@ -223,7 +244,8 @@ class HaltRecord:
 def _place(slot: int, key: int) -> int:
     if key < FIRST_ONES:
         return len(HEADER) + (slot * FIRST_ONES + key) * CELL
-    return FIRST_SIZE + (slot * (REGISTERS - FIRST_ONES) + key - FIRST_ONES) * CELL
+    added, vehicle = divmod(key - FIRST_ONES, VEHICLES)
+    return FIRST_SIZE + added * ADDED + (slot * VEHICLES + vehicle) * CELL
 
 
 def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:

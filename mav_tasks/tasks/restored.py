@@ -17,15 +17,16 @@ class Restored:
 
     ``tasks`` are in the order of their submission, ``next_id`` is the id of the next. By system id:
     ``paused`` are the paused queues with the reason, ``uids`` the vehicles' unique ids, ``speeds``
-    their default speeds in m/s, ``halt_epochs`` their numbers of halts,
-    ``halted`` the reason and time of the last halt, ``disarmed`` the vehicles that a person
-    disarmed. ``plans`` by system id and kind are (id, source) as in PlanStored, ``parameters`` the
-    last value of each by name, ``signatures`` and ``signed_until`` those of SignaturesSeen.
-    ``ended_well``: the last run closed its store; ``idle`` is the seconds since it last wrote.
-    ``wall_offset`` is UTC minus monotonic time. ``gateway``: the name of this server among those
-    that share the store; it gets vehicles, their tasks and the ids of new tasks later, as inputs;
-    "" if it shares nothing. ``signing_lead``: the seconds by which it signs ahead of its clock to
-    these vehicles, more than the gateway before.
+    their default speeds in m/s, ``halt_epochs`` their numbers of halts, ``halted`` the reason and
+    time of the last halt, ``disarmed`` the vehicles that a person disarmed. ``stopped``: by what a
+    vehicle was stopped, STOP (STOPPED) or an emergency stop (STOP), that ended more of its
+    ``tasks`` than these show. ``plans`` by system id and kind are (id, source) as in PlanStored,
+    ``parameters`` the last value of each by name, ``signatures`` and ``signed_until`` those of
+    SignaturesSeen. ``ended_well``: the last run closed its store; ``idle`` is the seconds since it
+    last wrote. ``wall_offset`` is UTC minus monotonic time. ``gateway``: the name of this server
+    among those that share the store; it gets vehicles, their tasks and the ids of new tasks later,
+    as inputs; "" if it shares nothing. ``signing_lead``: the seconds by which it signs ahead of its
+    clock to these vehicles, more than the gateway before.
     """
 
     tasks: tuple[Task, ...] = ()
@@ -36,6 +37,7 @@ class Restored:
     halt_epochs: Mapping[int, int] = field(default_factory=dict)
     halted: Mapping[int, tuple[TaskReason, float]] = field(default_factory=dict)
     disarmed: frozenset[int] = frozenset()
+    stopped: Mapping[int, TaskReason] = field(default_factory=dict)
     plans: StoredPlans = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     signatures: tuple[SignatureTime, ...] = ()

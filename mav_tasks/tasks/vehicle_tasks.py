@@ -17,7 +17,7 @@ from mav_tasks.tasks.driving.mission_sequencer import (
     skipped_to,
 )
 from mav_tasks.tasks.driving.stage import is_off_line
-from mav_tasks.tasks.events import SERVER, QueueContinued
+from mav_tasks.tasks.events import SERVER, QueueContinued, VehicleHalted
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, LastHalt
 from mav_tasks.tasks.lifecycle import (
@@ -76,6 +76,13 @@ class VehicleTasks(Lineup):
         if paused is R.STOPPED and last.reason is R.STOPPED:
             # the earlier run has done so, but its last events may not have been stored
             self._repeat_nothing(R.STOP, now=now, since=last.at)
+        if ended_by := restored.stopped.get(vehicle):
+            # the earlier run has done this, but only the record of halts knows that
+            killed = self._kill_what_drives(spares_missions=ended_by is R.STOP, now=now)
+            if ended_by is R.STOPPED:
+                self._repeat_nothing(R.STOP, now=now)
+            if killed is not None:
+                self.room.ended(killed, now=now)
 
     def belong_to_another(self, *, now: float) -> None:
         """Hold and pause these tasks: another vehicle answers at the address of theirs."""
@@ -296,8 +303,7 @@ class VehicleTasks(Lineup):
         vehicle would start by itself, and nobody would think of it.
         """
         self.halt(R.STOPPED, actor=actor, now=now)
-        killed = self.executor.kill(R.STOP, actor=actor, now=now)
-        self._end_clicks(actor=actor, now=now)
+        killed = self._kill_what_drives(actor=actor, now=now)
         self.pause_queue(R.STOPPED, actor=actor, now=now)
         if clear:
             self.clear(begun_too=True, actor=actor, now=now)
@@ -311,20 +317,30 @@ class VehicleTasks(Lineup):
 
         A mission at the autopilot's address stays, for ground stations show it. What stays waits.
         """
-        active = self.active
-        if active is not None and not (isinstance(active.goal, Plan) and active.terms.is_cruising):
-            self.executor.kill(R.STOP, actor=actor, now=now)
-            self._ended(active.id, now=now)
-        self._end_clicks(actor=actor, now=now)
+        # for the record of halts; the disarming that follows is the halt
+        self.registry.record(VehicleHalted(self.vehicle, self.halts.epoch, R.STOP, actor, now))
+        killed = self._kill_what_drives(spares_missions=True, actor=actor, now=now)
+        if killed is not None:
+            self._ended(killed, now=now)
         if self.has_others:
             self.pause_queue(R.OPERATOR, actor=actor, now=now)
 
-    def _end_clicks(self, *, actor: str, now: float) -> None:
-        """End all clicks: nobody who has stopped the vehicle sees where they would lead."""
+    def _kill_what_drives(
+        self, *, spares_missions: bool = False, actor: str = SERVER, now: float
+    ) -> TaskId | None:
+        """End the active task and all clicks; return the id of the former, or None.
+
+        Nobody who has stopped the vehicle sees where a click would lead.
+        """
+        task = self.active
+        is_mission = task is not None and isinstance(task.goal, Plan) and task.terms.is_cruising
+        is_spared = spares_missions and is_mission
+        killed = None if is_spared else self.executor.kill(R.STOP, actor=actor, now=now)
         for task in self.unfinished:
             if task.is_click:
                 self._end(task, S.KILLED, R.STOP, actor=actor, now=now)
         self.immediate = None
+        return killed
 
     def _repeat_nothing(
         self, reason: TaskReason, *, actor: str = SERVER, now: float, since: float = inf

@@ -35,7 +35,7 @@ HALTS: dict[str, Halt] = {"STOP": (STOP, (), SERVER), "disarming": (ARM, (0,), A
 DELAY = 6.0  # s, until the task that waits would drive
 GOES_ON = ("--set", "rules.on_restart=continue")
 NO_FILE_AT_ALL = 1  # byte
-RECORD = 98_368  # bytes, of the record of halts
+RECORD = 163_904  # bytes, of the record of halts
 MOST = 2_000  # changes that fill SQLite's log: as many as a slow disk takes into one transaction
 
 

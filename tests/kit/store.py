@@ -9,7 +9,7 @@ from typing import ClassVar
 from mav_tasks.config.settings import Retention
 from mav_tasks.engine.inputs import Committed, HaltsKept, StoreFailed
 from mav_tasks.store import MemoryStore, Outcome
-from mav_tasks.store.halt_record import word_of
+from mav_tasks.store.halt_record import HaltRecord, words_of
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import Event
 
@@ -80,7 +80,7 @@ class LateStore(MemoryStore):
     def append(self, events: Sequence[Event]) -> None:
         super().append(events)
         self._under_way.append((self.clock(), self._count))
-        if any(word_of(event, 0, offset=0.0) for event in events):
+        if any(words_of(event, 0, offset=0.0) for event in events):
             self._halts.append((self.clock(), self._count))
 
     def take_outcomes(self) -> list[Outcome]:
@@ -96,11 +96,17 @@ class LateStore(MemoryStore):
             outcomes.append(Committed(self._kept))
         return outcomes
 
-    def left_by_a_crash(self) -> list[Event]:
-        """Return what the next life of a real store would find."""
-        words = {}
-        for event in self.events[self._kept : self._kept_halts]:
-            word = word_of(event, 0, offset=0.0)
-            if word is not None:
-                words[word.key] = event
-        return [*self.events[: self._kept], *words.values()]
+    def left_by_a_crash(self) -> tuple[list[Event], list[Event]]:
+        """Return what the database has, and the later events of which the halt record knows."""
+        return self.events[: self._kept], self.events[self._kept : self._kept_halts]
+
+
+LIFE = 1_000_000  # events; no server of a test records so many
+
+
+def write_halts(path: Path, events: Sequence[Event], *, wall_offset: float) -> None:
+    """Write to the halt record of a closed store what its database did not get."""
+    record = HaltRecord(path, name=path.name)
+    for number, event in enumerate(events, record.last_number + LIFE):
+        record.write(*words_of(event, number, offset=wall_offset))
+    record.close()

@@ -14,13 +14,15 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, FAILED, MOVE, FakeClient, Sent
-from tests.kit.store import LateStore, PromptSqliteStore
+from tests.kit.store import LateStore, PromptSqliteStore, write_halts
+from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_gateways import Fleet
 
 GO_ON = Settings(on_restart="continue")
 NOT_KEPT = (FAILED, R.STORE_UNAVAILABLE)
 CANCEL, CLEAR, REPOSITION = 54010, 54011, 192
+MODIFY, EVERY, ARM, FORCED = 54012, 9, 400, 21196
 NAN = float("nan")
 HOLD = 4
 STARTS_IN = 4.0  # s, of the task that waits
@@ -64,6 +66,18 @@ def is_kept(kind: str, moment: str) -> bool:
     return kept_by_record or moment in ("after the database", "after both")
 
 
+def restart(world: World, store: LateStore, path: Path) -> None:
+    """Start another server on what the store of a killed one has left."""
+    kept, halts = store.left_by_a_crash()
+    before = PromptSqliteStore(path, wall_offset=0.0)
+    before.append(kept)
+    before.take_outcomes()
+    before.close()
+    write_halts(path, halts, wall_offset=0.0)
+    again = PromptSqliteStore(path, wall_offset=0.0)
+    world.start_server(again, again.load())
+
+
 @for_each("moment", MOMENTS)
 @for_each("kind", KINDS)
 def test_what_was_acknowledged_holds_after_a_crash(
@@ -97,10 +111,7 @@ def test_what_was_acknowledged_holds_after_a_crash(
     if sent.result != ACCEPTED and kind != "pause":  # a STOP's observer allows no motion after it
         return
     world.end_server()
-    again = PromptSqliteStore(tmp_path / "tasks.sqlite3", wall_offset=0.0)
-    again.append(store.left_by_a_crash())
-    again.take_outcomes()
-    world.start_server(again, again.load())
+    restart(world, store, tmp_path / "tasks.sqlite3")
     world.run(3.0)  # it may brake first
     there = world.truth
     world.run(WATCHED)
@@ -110,6 +121,37 @@ def test_what_was_acknowledged_holds_after_a_crash(
             assert world.state(1)[0] in {*TERMINAL, S.HELD}
     elif moment in ("before the record", "never kept"):
         assert world.truth.north - there.north > 0.5  # nobody had been promised anything
+
+
+@for_each("then", ["continue", "pause"])
+@for_each("halt", ["stop", "emergency stop"])
+def test_what_a_stop_has_ended_does_not_come_back(
+    make_world: MakeWorld, tmp_path: Path, halt: str, then: str
+) -> None:
+    store = LateStore()
+    world = make_world(store=store, settings=GO_ON)
+    world.client.command(MOVE, 1.0, 0, 0, 7, 0, 300.0, 5)
+    world.client.command(MODIFY, 1, EVERY, 60)
+    world.client.move(20.0)
+    world.until_state(2, S.EXECUTING)
+    world.client.command_int(REPOSITION, -1, 0, 0, NAN, target=(1, 1), frame=6, **at(0, 4))
+    world.run(0.5)
+    world.client.pause()
+    world.run(2.0)
+    assert [state for state, _ in map(world.state, (1, 2, 3))] == [S.SCHEDULED, S.PAUSED, S.QUEUED]
+    store.delay = inf
+    client = world.client
+    is_stop = halt == "stop"
+    sent = client.stop() if is_stop else client.command(ARM, 0, FORCED, target=(1, 1))
+    world.run(0.5)
+    told = client.proceed() if then == "continue" else client.pause()
+    world.run(0.5)
+    assert (sent.result, told.result) == (ACCEPTED, ACCEPTED)
+    world.end_server()
+    restart(world, store, tmp_path / "tasks.sqlite3")
+    world.run(5.0)
+    ends = [S.KILLED if is_stop else S.SCHEDULED, S.KILLED, S.KILLED]
+    assert world.states() == ends
 
 
 def test_a_repeated_halt_is_acknowledged_when_the_first_is_kept(make_world: MakeWorld) -> None:

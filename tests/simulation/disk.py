@@ -14,7 +14,7 @@ from mav_tasks.engine.inputs import StoreFailed
 from mav_tasks.store import Outcome
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
-from tests.kit.store import LateStore, PromptSqliteStore
+from tests.kit.store import LateStore, PromptSqliteStore, write_halts
 
 
 class Crash(BaseException):
@@ -25,15 +25,22 @@ class Disk:
     """One store file. Times are the world's; ``wall_offset`` is UTC minus world time, s."""
 
     def __init__(self, path: Path, *, wall_offset: float) -> None:
-        self.wall_offset = wall_offset
-        forever = Retention(max_age=None)
-        self._store = PromptSqliteStore(path, wall_offset=lambda: self.wall_offset, keep=forever)
+        self._path, self.wall_offset = path, wall_offset
+        self._open()
 
-    def write(self, events: Sequence[Event]) -> None:
-        """Make events durable, in order."""
+    def _open(self) -> None:
+        forever = Retention(max_age=None)
+        offset = lambda: self.wall_offset  # noqa: E731 - the clock may jump
+        self._store = PromptSqliteStore(self._path, wall_offset=offset, keep=forever)
+
+    def write(self, events: Sequence[Event], halts: Sequence[Event]) -> None:
+        """Make events durable, in order; of the ``halts`` after them only the record knows."""
         if events:
             self._store.append(events)
             self._store.take_outcomes()
+        self._store.close()
+        write_halts(self._path, halts, wall_offset=self.wall_offset)
+        self._open()
 
     def load(self, *, ended_well: bool, idle: float) -> Restored:
         """Return the state that the next server restores."""
@@ -79,8 +86,11 @@ class UncertainStore(LateStore):
         finally:
             self.delay = delay
 
-    def committed(self, *, in_order: bool) -> list[Event]:
-        """Return the events that survive an end now; one in order writes all that it can."""
+    def committed(self, *, in_order: bool) -> tuple[list[Event], list[Event]]:
+        """Return the events that survive an end now; one in order writes all that it can.
+
+        Of the second ones only the record of halts knows.
+        """
         if in_order and self.clock() >= self.full_until:
             self.delay = self.halts_delay = 0.0
         self.take_outcomes()

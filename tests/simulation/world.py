@@ -178,9 +178,9 @@ class SimulatedWorld(JudgedWorld):
         self.later(self._away, self.start)
         self._end(self.disk_store.committed(in_order=False), ended_well=False)
 
-    def _end(self, events: list[Event], *, ended_well: bool) -> None:
+    def _end(self, events: tuple[list[Event], list[Event]], *, ended_well: bool) -> None:
         self._follow()
-        self.disk.write(events)
+        self.disk.write(*events)
         self.end_server()
         self._forget_requests()
         self.wishes.clear()

@@ -60,10 +60,12 @@ def test_what_only_the_record_took_is_in_force_in_the_next_life(place: str) -> N
     assert (found.paused, found.ended_well) == ({1: R.STOPPED}, False)
     assert (found.halt_epochs, found.disarmed) == ({1: 7}, frozenset({2}))
     assert {STOP, halted} <= {event for number, event in journal if number > 1}
+    assert found.stopped == restored(place).stopped == {1: R.STOPPED}  # until it stores an event
     crash(place, QueuePaused(1, R.OPERATOR, "client", 101.0), CONTINUE)
     assert restored(place).paused == {}  # the newest word counts, whoever kept it
     life(place, STOP)
-    assert restored(place).paused == {1: R.STOPPED}
+    again = restored(place)
+    assert (again.paused, again.stopped) == ({1: R.STOPPED}, {})
 
 
 def test_a_database_that_knows_more_than_the_record_is_believed(place: str, tmp_path: Path) -> None:
@@ -151,6 +153,13 @@ def test_on_a_file_system_that_is_full_the_record_takes_a_stop_and_nothing_else_
     if done.returncode == NO_NAMESPACE or done.stderr.startswith("unshare:"):
         pytest.skip("this machine gives no file system of one's own")
     assert done.stdout.split() == ["not", "kept", "STOPPED"], done.stderr
+
+
+def test_a_record_of_the_version_before_is_read(path: Path, record_path: Path) -> None:
+    crash(path, STOP, VehicleArmingSet(2, False, 100.0))
+    os.truncate(record_path, 98_368)
+    found = restored(path)
+    assert (found.paused, found.disarmed) == ({1: R.STOPPED}, frozenset({2}))
 
 
 def test_a_record_with_holes_gets_its_blocks_when_it_is_opened(
