@@ -10,7 +10,15 @@ from collections.abc import Iterator
 from mav_tasks.config.settings import Settings
 from mav_tasks.tasks.events import SERVER, QueuePaused
 from mav_tasks.tasks.halts import WORDS, LastHalt
-from mav_tasks.tasks.lifecycle import ACTIVE, LOSSES, RUNNING, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import (
+    ACTIVE,
+    LOSSES,
+    RUNNING,
+    TAKEN,
+    WAITING,
+    TaskReason,
+    TaskState,
+)
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
@@ -69,9 +77,14 @@ class Fleet:
         return was_driven
 
     def last_halt(self, vehicle: int, *, now: float) -> LastHalt | None:
-        """Return a vehicle's last halt if it was a command, and is younger than UNSEEN."""
-        halt = self.of(vehicle).halts.by_somebody
-        return halt if halt.reason in WORDS and now - halt.at <= UNSEEN else None
+        """Return a vehicle's last halt if it was a command, and is younger than UNSEEN.
+
+        The end of a task whose vehicle somebody else has stops nothing.
+        """
+        tasks = self.of(vehicle)
+        halt, is_taken = tasks.halts.by_somebody, tasks.paused in TAKEN
+        stops = WORDS - {R.CANCELLED, R.CLEARED} if is_taken else WORDS
+        return halt if halt.reason in stops and now - halt.at <= UNSEEN else None
 
     def may_forget(self, vehicle: int, *, halted_before: float) -> bool:
         """Return whether no task of a vehicle runs, and no command has halted it just now.

@@ -1,6 +1,7 @@
 """A person at the rover, or another client, against what tasks and their clients ask for."""
 
 from math import inf, nan
+from pathlib import Path
 
 from pymavlink.dialects.v20 import common
 
@@ -15,7 +16,9 @@ from tests.kit.client import (
     GUIDED,
     setpoint,
 )
+from tests.kit.restarts import UTC, restart
 from tests.kit.rows import ask, check
+from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -46,6 +49,24 @@ def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, first: str,
         ask(world, then)
     check(world, f"wait 8 : {'ACCEPTED' if then else '-'} task 1: CANCELLED / mode manual")
     assert world.observer.sent_since(at) == []
+
+
+@for_each("mode", [Mode.AUTO, Mode.RTL])
+@for_each("how", [(CANCEL, 1), (CLEAR, 1)])
+def test_it_is_left_to_them_by_the_next_server_too(
+    make_world: MakeWorld, tmp_path: Path, mode: Mode, how: tuple[int, int]
+) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    world = driving(make_world(store=PromptSqliteStore(path, wall_offset=UTC)))
+    world.operator_mode(mode)
+    world.run(2)
+    world.client.command(*how)
+    world.run(0.3)
+    assert world.state(1)[0] is S.CANCELLED
+    at = world.now
+    restart(world, path, away=0.5)
+    assert world.mode() is mode
+    assert not {"zero", "HOLD"} & set(world.observer.sent_since(at))
 
 
 def driven_by_a_client(world: World) -> World:
