@@ -260,12 +260,24 @@ class VehicleTasks(Lineup):
             self.paused = R.NONE
             self.halts.lets_go()
             self.registry.record(QueueContinued(self.vehicle, actor, now))
+            self._put_held_first()
         if resumed is not None and self.is_of_another_frame(resumed, seen):
             self.executor.hold(R.FRAME_RESET, now=now)
         elif resumed is not None:
             self.executor.resume(seen, actor=actor, now=now)
             self._begun_at = now
         return None if active is None else active.id
+
+    def _put_held_first(self) -> None:
+        """Suspend a paused active task for a held one: its turn comes after the decision."""
+        active, held = self.active, self.held
+        if active is None or held is None or active.state is not S.PAUSED:
+            return
+        if not self.executor.resumes_by_itself:
+            self.set_aside(active.id)
+            self.suspended_ids[active.id] = True  # it goes on from its line only
+            del self.suspended_ids[held.id]
+            self.executor.adopt(held)
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
         """Hold the active task until a client decides.

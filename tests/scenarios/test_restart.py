@@ -79,6 +79,19 @@ def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, 
     assert world.state(1) == ((S.CANCELLED, R.SKIPPED) if how == SKIP else (S.COMPLETED, R.NONE))
 
 
+def test_one_continue_is_enough_if_an_immediate_return_is_skipped(world: World, path: Path) -> None:
+    world.client.move(5)
+    world.run(4)
+    world.client.mode(RETURN)
+    world.until_state(2, S.EXECUTING)
+    restart(world, path)
+    assert [world.state(i)[0] for i in (1, 2)] == [S.PAUSED, S.HELD]
+    world.client.proceed()
+    world.run(1)
+    assert release(world, 2, SKIP) == (ACCEPTED, 2)
+    world.until_state(1, S.COMPLETED)
+
+
 def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
     world: World, path: Path
 ) -> None:
