@@ -65,7 +65,8 @@ class VehicleTasks(Lineup):
         self.uid = restored.uids.get(vehicle, "")
         self.may_be_armed = vehicle not in restored.disarmed
         self._apply_driving()
-        for task in tasks:
+        # the one that changed last had the vehicle
+        for task in sorted(tasks, key=lambda task: task.changed_at or -inf, reverse=True):
             self.of_earlier_run.add(task.id)
             if self.active is not None or task.reason is R.PREEMPTED:
                 self.suspended_ids[task.id] = True  # who moved it meanwhile is not known

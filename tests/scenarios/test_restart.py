@@ -92,6 +92,20 @@ def test_one_continue_is_enough_if_an_immediate_return_is_skipped(world: World, 
     world.until_state(1, S.COMPLETED)
 
 
+def test_a_return_that_was_paused_is_resumed_first(world: World, path: Path) -> None:
+    world.client.move(5)
+    world.run(6)
+    world.client.mode(RETURN)
+    world.until_state(2, S.EXECUTING)
+    world.client.pause()
+    world.run(2)
+    restart(world, path)
+    assert [world.state(i)[0] for i in (1, 2)] == [S.PAUSED, S.PAUSED]
+    world.client.proceed()
+    world.until_state(2, S.COMPLETED)
+    assert world.state(1)[0] is not S.COMPLETED
+
+
 def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
     world: World, path: Path
 ) -> None:
