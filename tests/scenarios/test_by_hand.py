@@ -19,6 +19,7 @@ from tests.kit.client import (
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import ask, check
 from tests.kit.store import PromptSqliteStore
+from tests.kit.words import CANCEL, CLEAR
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
