@@ -310,7 +310,8 @@ def test_the_end_of_the_mission_before_is_stored_before_the_ack(
     store.delay = delay
     world.until(lambda: len(acks(world.client)) == 2, within=1)
     assert acks(world.client)[-1].result == result
-    kept = {event.new for event in store.left_by_a_crash() if isinstance(event, TaskChanged)}
+    events, _ = store.left_by_a_crash()
+    kept = {event.new for event in events if isinstance(event, TaskChanged)}
     assert (S.CANCELLED in kept) is (result == 0)
 
 

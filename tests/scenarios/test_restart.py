@@ -10,7 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, MOVE
+from tests.kit.client import ACCEPTED, MOVE, RTL
 from tests.kit.mission import Download, reached
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import check
@@ -82,7 +82,7 @@ def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, 
 def test_one_continue_is_enough_if_an_immediate_return_is_skipped(world: World, path: Path) -> None:
     world.client.move(5)
     world.run(4)
-    world.client.mode(RETURN)
+    world.client.mode(RTL)
     world.until_state(2, S.EXECUTING)
     restart(world, path)
     assert [world.state(i)[0] for i in (1, 2)] == [S.PAUSED, S.HELD]
@@ -95,7 +95,7 @@ def test_one_continue_is_enough_if_an_immediate_return_is_skipped(world: World, 
 def test_a_return_that_was_paused_is_resumed_first(world: World, path: Path) -> None:
     world.client.move(5)
     world.run(6)
-    world.client.mode(RETURN)
+    world.client.mode(RTL)
     world.until_state(2, S.EXECUTING)
     world.client.pause()
     world.run(2)
