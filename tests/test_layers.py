@@ -1,6 +1,7 @@
 """Who may import whom, what pure packages may not touch, and on which seams tests stand."""
 
 import ast
+import subprocess
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -8,6 +9,9 @@ from pathlib import Path
 import mav_tasks
 
 ROOT = Path(__file__).resolve().parent.parent
+
+#: beside dotfiles
+TOP = {"README.md", "dialects", "mav_tasks", "pyproject.toml", "sim", "tests", "tools"}
 
 #: rooms of mav_tasks, each with those above it that it may import; then the rover's
 LAYERS = """
@@ -140,6 +144,12 @@ def violations(module: str, path: Path) -> list[str]:
         for imported in imports_of(path)
         if (target := layer_of(imported)) in MAY_IMPORT and target not in allowed
     ]
+
+
+def test_nothing_but_what_was_agreed_stands_at_the_top() -> None:
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, check=True)
+    names = {line.strip('"').partition("/")[0] for line in listed.stdout.decode().splitlines()}
+    assert {name for name in names if not name.startswith(".")} == TOP
 
 
 def test_every_module_has_a_rule() -> None:

@@ -213,7 +213,7 @@ class HaltRecord:
             raise OSError(EIO, "another file was copied over it while it was in use")
 
     def outlast(self, words: Sequence[Word], number: int) -> None:
-        """Give words a later number, so that they count until an event of that number is stored.
+        """Renumber words: they count until the database has the event of that number.
 
         Raise StoreError if that fails.
         """

@@ -79,7 +79,7 @@ class Fleet:
     def last_halt(self, vehicle: int, *, now: float) -> LastHalt | None:
         """Return a vehicle's last halt if it was a command, and is younger than UNSEEN.
 
-        The end of a task whose vehicle somebody else has stops nothing.
+        A cancel or clear does not count while somebody else has the vehicle.
         """
         tasks = self.of(vehicle)
         halt, is_taken = tasks.halts.by_somebody, tasks.paused in TAKEN

@@ -113,7 +113,7 @@ class Answer(Protocol):
     def __call__(self, answer: Rejection | int, /, *, now: float) -> object: ...
 
 
-#: results of a vehicle that has a plan, or for which there is none
+#: a vehicle's results after which the next plan goes to it: it took this one, or cannot have such
 WRITTEN = frozenset({MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED})
 
 

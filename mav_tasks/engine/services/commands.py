@@ -376,7 +376,7 @@ class CommandSender:
         return outgoing, answers
 
     def _goes_on(self, request: _Request, ack: CommandAck, *, now: float) -> None:
-        """Give a command that is being carried out time to end; no copy of it is sent.
+        """Prolong the time for a command that the vehicle is carrying out; send no copy of it.
 
         What is urgent is repeated nevertheless: it halts the vehicle.
         """
